@@ -39,9 +39,17 @@ pub(crate) struct CuttingArguments {
     /// Take the .vtk meshes of this folder instead of generated ones.
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
-    /// Tets of a generated liver beside them; 0 for none.
-    #[arg(long, value_name = "N", default_value_t = 1_000_000)]
-    largest: usize,
+    /// Tets of generated livers beside them.
+    #[arg(
+        long,
+        value_name = "N,...",
+        value_delimiter = ',',
+        default_value = "100000,1000000"
+    )]
+    generated: Vec<usize>,
+    /// Only the tables of a stroke by stages and by frames.
+    #[arg(long)]
+    stroke_only: bool,
     /// Write the tables to this file as well.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -57,12 +65,21 @@ pub(crate) fn cutting(arguments: &CuttingArguments) -> anyhow::Result<()> {
         let chosen = ["liver_11k", "liver_89k", "armadillo_227k"];
         models.retain(|model| chosen.contains(&model.name.as_str()));
     }
-    if arguments.largest > 0 && !arguments.quick {
-        models.push(Model::generated(Shape::Liver, arguments.largest)?);
+    if !arguments.quick {
+        for tets in arguments.generated.iter().copied() {
+            models.push(Model::generated(Shape::Liver, tets)?);
+        }
     }
     let mut text = String::new();
-    writeln!(text, "## A stroke by stages\n\n{}\n", stages(&models)?)?;
-    for model in models.iter().take(1) {
+    let [stages, frames] = stages(&models)?;
+    writeln!(text, "## A stroke by stages\n\n{stages}\n")?;
+    writeln!(text, "## Median and worst frame by size\n\n{frames}\n")?;
+    let rest = if arguments.stroke_only {
+        &[]
+    } else {
+        &models[..]
+    };
+    for model in rest.iter().take(1) {
         let table = speeds(model, arguments.quick)?;
         writeln!(
             text,
@@ -70,10 +87,12 @@ pub(crate) fn cutting(arguments: &CuttingArguments) -> anyhow::Result<()> {
             model.name
         )?;
     }
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let table = one.install(|| alone(&models))?;
-    writeln!(text, "## Cutting by itself\n\n{table}\n")?;
-    for model in models.iter().take(1) {
+    if !rest.is_empty() {
+        let one = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+        let table = one.install(|| alone(rest))?;
+        writeln!(text, "## Cutting by itself\n\n{table}\n")?;
+    }
+    for model in rest.iter().take(1) {
         writeln!(
             text,
             "## Snapping, {}\n\n{}\n",
@@ -109,8 +128,12 @@ struct Cost {
     solve: f64,
     /// Median of all stages in ms.
     follow: f64,
-    /// Largest ratio of a frame's cutting to its solving.
+    /// Largest ratio of a frame's cutting to the median solve time.
     largest: f64,
+    /// Frame with the largest sum of stages in ms: cut, cluster, color, schedule.
+    worst: [f64; 4],
+    /// Frames with the blade beside the body, in ms: the first one, then the median and the largest of the others.
+    air: [f64; 3],
 }
 
 impl Cost {
@@ -130,37 +153,54 @@ impl Cost {
         }];
         let mut simulation = Simulation::with_threads(&scene, 1)?;
         let (mut sums, mut cut_tets) = ([0.0; 4], 0);
-        let (mut solves, mut follows, mut largest) = (Vec::new(), Vec::new(), 0.0_f64);
-        for _ in 0..frames + 2 {
+        let (mut solves, mut follows) = (Vec::new(), Vec::new());
+        let (mut worst, mut air) = ([0.0; 4], Vec::new());
+        for frame in 0..frames + 2 {
             let report = simulation.step()?;
-            let Some(cut) = report.cut else { continue };
             let ms = report.ms;
             let parts = [ms.cut, ms.cluster, ms.color, ms.schedule];
+            let Some(cut) = report.cut else {
+                if (1..=frames).contains(&frame) {
+                    air.push(parts.iter().sum::<f64>());
+                }
+                continue;
+            };
             for (sum, part) in sums.iter_mut().zip(parts) {
                 *sum += part;
             }
             cut_tets += cut.tets_cut;
             let follow: f64 = parts.iter().sum();
-            largest = largest.max(follow / ms.solve);
+            if follow > worst.iter().sum() {
+                worst = parts;
+            }
             solves.push(ms.solve);
             follows.push(follow);
         }
         simulation.check()?;
         ensure!(cut_tets > 0, "the blade missed {}", model.name);
+        ensure!(!air.is_empty(), "the blade starts in {}", model.name);
+        let others = air.split_off(1);
+        let solve = median(solves.iter().copied());
         Ok(Self {
             cut_tets,
             cutting_frames: solves.len(),
             stages: sums.map(|sum| 1e3 * sum / cut_tets as f64),
-            solve: median(solves),
+            solve,
             follow: median(follows),
-            largest,
+            largest: worst.iter().sum::<f64>() / solve,
+            worst,
+            air: [
+                air[0],
+                median(others.iter().copied()),
+                others.iter().copied().fold(0.0, f64::max),
+            ],
         })
     }
 }
 
-/// Stages of the frames that cut, in microseconds per cut tet, and the solve time.
-fn stages(models: &[Model]) -> anyhow::Result<Table> {
-    let mut table = table([
+/// Stages of the frames that cut, in microseconds per cut tet; median and worst frame against the solve time.
+fn stages(models: &[Model]) -> anyhow::Result<[Table; 2]> {
+    let mut stages = table([
         "mesh",
         "tets",
         "tets cut",
@@ -169,13 +209,35 @@ fn stages(models: &[Model]) -> anyhow::Result<Table> {
         "color",
         "schedule",
         "in all",
+    ]);
+    let mut frames = table([
+        "mesh",
+        "tets",
         "solve ms (median)",
-        "cut to schedule, ms (median)",
-        "share of solving",
-        "largest share of a frame",
+        "cut to layout ms (median)",
+        "of the solve time",
+        "worst frame ms",
+        "of the solve time",
+        "cut, cluster, color, schedule and layout",
+        "first frame, blade outside ms",
+        "blade outside ms (median)",
+        "the largest",
     ]);
     for model in models {
         let cost = Cost::measure(model, FRAMES)?;
+        frames.add_row([
+            model.name.clone(),
+            model.mesh.tets.len().to_string(),
+            format!("{:.3}", cost.solve),
+            format!("{:.3}", cost.follow),
+            format!("{:.1} %", 100.0 * cost.follow / cost.solve),
+            format!("{:.3}", cost.worst.iter().sum::<f64>()),
+            format!("{:.1} %", 100.0 * cost.largest),
+            cost.worst.map(|ms| format!("{ms:.2}")).join(", "),
+            format!("{:.3}", cost.air[0]),
+            format!("{:.3}", cost.air[1]),
+            format!("{:.3}", cost.air[2]),
+        ]);
         let mut row = vec![
             model.name.clone(),
             model.mesh.tets.len().to_string(),
@@ -188,15 +250,9 @@ fn stages(models: &[Model]) -> anyhow::Result<Table> {
                 .chain([&all])
                 .map(|us| format!("{us:.2}")),
         );
-        row.extend([
-            format!("{:.3}", cost.solve),
-            format!("{:.3}", cost.follow),
-            format!("{:.1} %", 100.0 * cost.follow / cost.solve),
-            format!("{:.1} %", 100.0 * cost.largest),
-        ]);
-        table.add_row(row);
+        stages.add_row(row);
     }
-    Ok(table)
+    Ok([stages, frames])
 }
 
 /// Measures a stroke at different speeds.

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::Context;
 use incise::mesh::glam::DVec3;
-use incise::mesh::{RepairOptions, repair};
+use incise::mesh::{RepairOptions, TetMesh, repair};
 use incise::mesh_io::{
     Field, Fields, MeshIoError, Values, write_atomically, write_pvd, write_vtp, write_vtu,
 };
@@ -218,9 +218,10 @@ impl Output {
         let colors = numbers(&|t| coloring.color(cluster(t).index()).0);
         let labels = mesh.pieces().labels;
         let pieces = numbers(&|t| labels[t]);
+        let (used, positions) = used_particles(simulation);
         let particles = [Field {
             name: "rest_position",
-            values: Values::Vectors(&mesh.positions),
+            values: Values::Vectors(&used.positions),
         }];
         let cells = [
             ("cluster", &clusters),
@@ -235,12 +236,7 @@ impl Output {
             particles: &particles,
             cells: &cells,
         };
-        write_vtu(
-            self.folder.join("mesh.vtu"),
-            simulation.positions(),
-            &mesh.tets,
-            fields,
-        )?;
+        write_vtu(self.folder.join("mesh.vtu"), &positions, &used.tets, fields)?;
         let said = self
             .pictures
             .map(|pictures| pictures.finish(&self.folder))
@@ -272,18 +268,11 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
 /// Writes the rest mesh without the unused particles of removed tets. A `.vtu` file also has the deformed positions;
 /// other formats cannot store them.
 pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<()> {
-    let drop_unused = RepairOptions {
-        drop_unused: true,
-        ..RepairOptions::default()
-    };
-    let used = repair(simulation.mesh(), &drop_unused);
-    let mesh = &used.mesh;
+    let (mesh, positions) = used_particles(simulation);
     if path
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("vtu"))
     {
-        let now = simulation.positions();
-        let positions: Vec<DVec3> = used.particles.iter().map(|p| now[p.index()]).collect();
         let particles = [Field {
             name: "position",
             values: Values::Vectors(&positions),
@@ -294,7 +283,20 @@ pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<
         };
         write_vtu(path, &mesh.positions, &mesh.tets, fields)?;
     } else {
-        incise::mesh_io::write(path, mesh)?;
+        incise::mesh_io::write(path, &mesh)?;
     }
     Ok(())
+}
+
+/// The rest mesh without the unused particles of removed tets, and the deformed positions of its particles. Tets keep their
+/// numbers.
+fn used_particles(simulation: &Simulation) -> (TetMesh, Vec<DVec3>) {
+    let drop_unused = RepairOptions {
+        drop_unused: true,
+        ..RepairOptions::default()
+    };
+    let used = repair(simulation.mesh(), &drop_unused);
+    let now = simulation.positions();
+    let positions = used.particles.iter().map(|p| now[p.index()]).collect();
+    (used.mesh, positions)
 }

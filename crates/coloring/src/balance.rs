@@ -20,8 +20,9 @@
 //! 3. *Flips* of the alternating components of two classes, singly and in pairs, so that a heavy
 //!    vertex can be exchanged for a lighter one. One round costs at most k passes over the input.
 //!
-//! Steps 2 and 3 alternate as long as they find something and the range is above 1. The result is a
-//! local optimum: whether a graph has an even coloring with k colors at all is NP-hard to tell.
+//! Steps 2 and 3 alternate as long as they find something and the range is above 1, up to a limit of
+//! four questions per vertex about the classes around it, which takes less than ten times a first fit. What they reach
+//! without the limit is a local optimum: whether a graph has an even coloring with k colors at all is NP-hard to tell.
 //!
 //! Sources: moves within the given colors, the "shuffling" of Lu et al. (2015); paths in the graph
 //! of classes, Kierstead, Kostochka, Mydlarz and Szemeredi (2010); alternating components, Kempe
@@ -31,6 +32,7 @@ mod chains;
 mod flips;
 mod partition;
 mod surroundings;
+mod work;
 
 use incise_graph::Coloring;
 
@@ -39,6 +41,7 @@ use chains::Chains;
 use flips::Flips;
 use partition::Partition;
 use surroundings::{Bits, Surroundings, Walk};
+use work::Work;
 
 /// Changes made by [`balance`]. Ranges are those of the colors that carry weight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -52,6 +55,8 @@ pub struct BalanceStats {
     pub flips: usize,
     /// Number of vertices that changed their color.
     pub changed: usize,
+    /// Whether the search for chains and flips ended at its limit of work, before it found no more.
+    pub stopped: bool,
     /// Weight of the heaviest class minus that of the lightest before.
     pub range_before: u64,
     /// Weight of the heaviest class minus that of the lightest after.
@@ -72,9 +77,9 @@ pub struct BalanceStats {
 /// range of at most 1 with weights of 1, and seldom more with sizes of clusters.
 ///
 /// Sequential and deterministic; a graph and the incidence it came from give equal results. Usually
-/// one or two passes over the input. Every further round costs at most k passes; the number of
-/// rounds is small, bounded only by the fall of the sum of squares. Memory: O(n + k), from
-/// incidence also k bits per particle.
+/// one or two passes over the input. The search for better exchanges ends after work that takes less than ten times
+/// [`auto`](crate::auto); [`BalanceStats::stopped`] tells, and another call continues. Memory: O(n + k), from incidence
+/// also k bits per particle.
 ///
 /// # Panics
 /// If there is not one color and one weight per vertex.
@@ -137,15 +142,17 @@ fn level(partition: &mut Partition<'_>, mut around: impl Surroundings, stats: &m
     }
     let mut chains = Chains::new(partition);
     let mut flips = Flips::new(partition);
+    let mut work = Work::for_vertices(partition.class.len());
     while partition.range() > 1 {
-        let followed = chains.run(partition, &mut around);
-        let flipped = flips.run(partition, &mut around);
+        let followed = chains.run(partition, &mut around, &mut work);
+        let flipped = flips.run(partition, &mut around, &mut work);
         stats.chains += followed;
         stats.flips += flipped;
-        if followed + flipped == 0 {
+        if followed + flipped == 0 || work.is_spent() {
             break;
         }
     }
+    stats.stopped = work.is_spent() && partition.range() > 1;
 }
 
 /// Takes vertices from classes above the mean to classes below it; returns how many.

@@ -36,6 +36,12 @@ pub enum ColoringError {
         /// The particle.
         particle: u32,
     },
+    /// A constraint that is to be removed does not exist, or a constraint that is to be added has no particle.
+    #[error("constraint {vertex} has no particles")]
+    NoParticles {
+        /// The number of the constraint to remove, or the position of the constraint in the list of those to add.
+        vertex: u32,
+    },
     /// The coloring is not proper or has another number of vertices.
     #[error(transparent)]
     Graph(#[from] incise_graph::GraphError),

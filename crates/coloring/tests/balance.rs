@@ -372,3 +372,35 @@ proptest! {
         assert_settled(&graph, &after, &weights);
     }
 }
+
+/// The edges of a triangulated sheet, where six colors are as few as there can be: the search ends at its limit, and
+/// further calls continue it.
+#[test]
+fn balancing_stops_at_its_limit_and_continues() {
+    let side = 120u32;
+    let mut springs = Vec::new();
+    for (y, x) in (0..side).flat_map(|y| (0..side).map(move |x| (y, x))) {
+        for (dx, dy) in [(1, 0), (0, 1), (1, 1)] {
+            if x + dx < side && y + dy < side {
+                springs.push([side * y + x, side * (y + dy) + x + dx]);
+            }
+        }
+    }
+    let incidence = Incidence::from_constraints((side * side) as usize, &springs).unwrap();
+    let mut coloring = incise_coloring::auto(&incidence).coloring;
+    let weights = vec![1; springs.len()];
+    let first = balance(&incidence, &mut coloring, &weights);
+    assert!(
+        first.stopped && first.range < first.range_before / 2,
+        "{first:?}"
+    );
+    let mut last = first;
+    for _ in 0..20 {
+        coloring.verify_incidence(&incidence).unwrap();
+        if !last.stopped {
+            break;
+        }
+        last = balance(&incidence, &mut coloring, &weights);
+    }
+    assert!(!last.stopped && last.range <= 1, "{last:?}");
+}

@@ -244,3 +244,74 @@ proptest! {
         }
     }
 }
+
+proptest! {
+    /// Random additions and removals by number: numbers belong to one constraint at a time, the smallest vacant ones
+    /// are given first, and the classes hold exactly the present constraints, each with particles of its own.
+    #[test]
+    fn constraints_are_added_and_removed_by_number(
+        program in vec((any::<u8>(), vec(vec(0u32..20, 1..5), 0..6)), 1..30),
+    ) {
+        let nothing = Incidence::from_constraints(0, [[0u32; 0]; 0]).unwrap();
+        let mut recoloring = Recoloring::new(&nothing, 2);
+        let mut present = std::collections::BTreeMap::new();
+        for (choice, constraints) in program {
+            let (numbers, _) = recoloring.add(&constraints).unwrap();
+            let vacant = (0..).filter(|number| !present.contains_key(number));
+            prop_assert!(numbers.iter().copied().eq(vacant.take(constraints.len())));
+            present.extend(numbers.into_iter().zip(constraints));
+            let removed: Vec<u32> = present.keys().copied().filter(|n| (n * 7 + u32::from(choice)) % 3 == 0).collect();
+            recoloring.remove(&removed).unwrap();
+            for number in removed {
+                present.remove(&number);
+            }
+            recoloring.check().unwrap();
+            let mut listed = recoloring.classes().values().to_vec();
+            listed.sort_unstable();
+            prop_assert!(listed.iter().eq(present.keys()));
+            for members in recoloring.classes().iter() {
+                let mut particles: Vec<u32> = Vec::new();
+                for number in members {
+                    let mut own = present[number].clone();
+                    own.sort_unstable();
+                    own.dedup();
+                    particles.extend(own);
+                }
+                let all = particles.len();
+                particles.sort_unstable();
+                particles.dedup();
+                prop_assert_eq!(particles.len(), all);
+            }
+        }
+    }
+}
+
+#[test]
+fn a_large_number_adds_no_constraints_to_the_classes() {
+    let springs = Incidence::from_constraints(5, [[0u32, 1], [1, 2], [2, 3], [3, 4]]).unwrap();
+    let mut recoloring = Recoloring::new(&springs, 1);
+    recoloring.apply(&[], &pairs(1000, &[0, 4])).unwrap();
+    let mut listed = recoloring.classes().values().to_vec();
+    listed.sort_unstable();
+    assert_eq!(listed, [0, 1, 2, 3, 1000]);
+    assert_eq!(recoloring.add([[0u32, 2]]).unwrap().0, [4]);
+    recoloring.check().unwrap();
+}
+
+#[test]
+fn edits_by_number_that_name_no_constraint_change_nothing() {
+    let springs = Incidence::from_constraints(3, [[0u32, 1], [1, 2]]).unwrap();
+    let mut recoloring = Recoloring::new(&springs, 1);
+    let before = recoloring.coloring().clone();
+    let none = |vertex| ColoringError::NoParticles { vertex };
+    assert_eq!(recoloring.remove(&[0, 7]), Err(none(7)));
+    assert!(matches!(
+        recoloring.remove(&[1, 1]),
+        Err(ColoringError::NoSuchPair { vertex: 1, .. })
+    ));
+    assert_eq!(recoloring.add([vec![0u32], vec![]]), Err(none(1)));
+    assert_eq!(recoloring.coloring(), &before);
+    recoloring.check().unwrap();
+    assert_eq!(recoloring.remove(&[0]).unwrap().colored, 0);
+    assert_eq!(recoloring.remove(&[0]), Err(none(0)));
+}

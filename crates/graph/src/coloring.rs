@@ -109,6 +109,25 @@ impl Coloring {
         Classes::group(self.color_count(), self.colors.iter().map(|color| color.0))
     }
 
+    /// The vertices of every color that fulfill a condition, ascending. O(vertices + colors).
+    ///
+    /// ```
+    /// use incise_graph::{ColorId, Coloring};
+    ///
+    /// // Vertex 1 is the slot of a removed constraint.
+    /// let coloring = Coloring::new([0, 0, 1].map(ColorId).to_vec());
+    /// let classes = coloring.classes_of(|v| v != 1);
+    /// assert!(classes.iter().eq([&[0], &[2]]));
+    /// ```
+    #[must_use]
+    pub fn classes_of(&self, is_member: impl Fn(usize) -> bool + Clone) -> Classes {
+        let labels = self.colors.iter().enumerate();
+        // No class has this label.
+        let label =
+            move |(v, color): (usize, &ColorId)| if is_member(v) { color.0 } else { u32::MAX };
+        Classes::group(self.color_count(), labels.map(label))
+    }
+
     /// Checks that adjacent vertices of `graph` differ. O(vertices + edges).
     ///
     /// # Errors

@@ -6,6 +6,8 @@
 //!
 //! Cost of construction: O(particles + entries), two counting passes and a stamp array.
 
+use std::borrow::Borrow;
+
 use crate::csr::{Csr, fits};
 use crate::{Clustering, GraphError};
 
@@ -71,7 +73,8 @@ impl Incidence {
         })
     }
 
-    /// Builds an incidence from an iterator over lists of particle numbers. O(particles + entries).
+    /// Builds an incidence from an iterator over lists of particle numbers, by value or by reference: from a
+    /// `Vec<[u32; 4]>`, a `&[[u32; 2]]` or a `&[Vec<u32>]`. O(particles + entries).
     ///
     /// # Errors
     /// A particle not below `particles`; a constraint that names a particle twice; more than
@@ -83,16 +86,19 @@ impl Incidence {
     /// let tets = [[0u32, 1, 2, 3], [1, 2, 3, 4]];
     /// let incidence = Incidence::from_constraints(5, tets)?;
     /// assert_eq!(incidence.clique_bound(), 2);
+    ///
+    /// let rods: &[Vec<u32>] = &[vec![0, 1, 2], vec![2, 3]];
+    /// assert_eq!(Incidence::from_constraints(4, rods)?.particles_of(1), [2, 3]);
     /// # Ok::<(), incise_graph::GraphError>(())
     /// ```
     pub fn from_constraints(
         particles: usize,
-        constraints: impl IntoIterator<Item = impl IntoIterator<Item = impl Into<u32>>>,
+        constraints: impl IntoIterator<Item = impl IntoIterator<Item = impl Borrow<u32>>>,
     ) -> Result<Self, GraphError> {
         let mut offsets = vec![0];
         let mut values = Vec::new();
         for constraint in constraints {
-            values.extend(constraint.into_iter().map(Into::into));
+            values.extend(constraint.into_iter().map(|particle| *particle.borrow()));
             let end = u32::try_from(values.len()).map_err(|_| GraphError::TooMany {
                 what: "constraint-particle pairs",
                 count: values.len(),

@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3};
 use incise_xpbd::Pose;
 
 use crate::Error;
-use crate::backend::{AnySolver, each_mut};
+use crate::backend::{AnySolver, each, each_mut};
 use crate::collider::rotation;
 use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
@@ -52,6 +52,8 @@ pub(crate) struct Attachment {
     particles: Vec<usize>,
     /// Center of these particles when they were attached, in m.
     middle: DVec3,
+    /// The same center in its frame, in m.
+    center: DVec3,
     /// The number of its frame in the solver.
     pub(crate) number: u32,
 }
@@ -106,8 +108,14 @@ impl Attachment {
             motion: Motion::Path,
             particles: held,
             middle: DVec3::ZERO,
+            center: DVec3::ZERO,
             number: 0,
         })
+    }
+
+    /// Its key in the scene; `attachment` if a program added it.
+    pub(crate) fn field(&self) -> &str {
+        &self.field
     }
 
     /// Whether it holds no particle.
@@ -145,7 +153,13 @@ impl Attachment {
                     .map_err(|source| Error::Xpbd { field: field.clone(), source })?;
             }
         });
+        self.center = pose.rotation.conjugate() * (self.middle - pose.position);
         Ok(())
+    }
+
+    /// Where its frame has carried the center of the particles that were attached at first, in m.
+    pub(crate) fn center(&self, solver: &AnySolver) -> DVec3 {
+        each!(solver, solver => solver.handle(self.number)).apply(self.center)
     }
 
     /// Detaches all its particles, those that cuts made too.

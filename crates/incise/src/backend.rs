@@ -9,7 +9,7 @@ use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
+use incise_xpbd::{Forces, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
 
 use crate::Error;
 use crate::compute_device::ComputeDevice;
@@ -300,6 +300,11 @@ impl AnySolver {
         }
     }
 
+    /// The position of a particle in the world in m.
+    pub(crate) fn position(&self, particle: u32) -> DVec3 {
+        each!(self, solver => solver.position(particle as usize))
+    }
+
     pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
         each!(self, solver => solver.positions(out));
     }
@@ -373,6 +378,14 @@ impl<R: Real> SolverBackend for Backend<R> {
                 .residuals(substep_time)
                 .map(LastSubstep::Constraints),
         }
+    }
+
+    fn measure_forces(&mut self, measuring: bool) {
+        self.solver.measure_forces(measuring);
+    }
+
+    fn forces(&self) -> Option<Forces> {
+        self.solver.forces()
     }
 
     fn move_handle(&mut self, handle: u32, pose: Pose) {

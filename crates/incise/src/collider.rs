@@ -32,6 +32,11 @@ impl ColliderHandle {
     pub(crate) fn of_scene(index: usize) -> Self {
         Self(u32::try_from(index).expect("colliders are numbered in 32 bits"))
     }
+
+    /// Its number, in the order of the scene and then of addition.
+    pub(crate) fn number(self) -> usize {
+        self.0 as usize
+    }
 }
 
 /// Handle -> index of the collider in the settings of all islands.
@@ -61,6 +66,16 @@ impl Colliders {
     /// The index of a collider in the settings, unless it was removed.
     pub(crate) fn index(&self, handle: ColliderHandle) -> Option<usize> {
         self.handles.iter().position(|h| *h == Some(handle))
+    }
+
+    /// The index of the ground in the settings, if there is one.
+    pub(crate) fn ground(&self) -> Option<usize> {
+        self.handles.iter().position(Option::is_none)
+    }
+
+    /// The handles of all colliders, in the order of the settings.
+    pub(crate) fn all(&self) -> impl Iterator<Item = ColliderHandle> + '_ {
+        self.handles.iter().filter_map(|handle| *handle)
     }
 
     /// Names a collider that goes to the end of the settings.

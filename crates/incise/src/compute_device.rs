@@ -12,7 +12,7 @@ use incise_gpu::{GpuContext, GpuOptions};
 
 use crate::scene::{Backend, Method, Precision};
 use crate::validate::value;
-use crate::{Error, Scene};
+use crate::{Error, Scene, forces};
 
 /// A device that is open, if one is.
 #[derive(Clone, Debug, Default)]
@@ -118,6 +118,7 @@ impl ComputeDevice {
 /// Returns an error if the GPU path does not support a setting of the scene.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     let solver = &scene.solver;
+    forces::check(&scene.report, solver.method, true)?;
     if scene.contact.is_some() {
         return Err(value("contact", "declared", "absent on a GPU"));
     }

@@ -10,7 +10,7 @@ use glam::DVec3;
 use incise_clustering::Method;
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
-use incise_xpbd::{Pose, Solver, StepReport, StepSettings};
+use incise_xpbd::{Forces, Pose, Solver, StepReport, StepSettings};
 
 use crate::Error;
 use crate::report::{Milliseconds, milliseconds};
@@ -77,6 +77,12 @@ impl SolverBackend for Device {
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
         let residuals = self.solver.cached_host().residuals(substep_time);
         residuals.map(LastSubstep::Constraints)
+    }
+
+    fn measure_forces(&mut self, _measuring: bool) {}
+
+    fn forces(&self) -> Option<Forces> {
+        None
     }
 
     fn move_handle(&mut self, handle: u32, pose: Pose) {

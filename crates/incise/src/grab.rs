@@ -61,6 +61,24 @@ impl Grabs {
         }
     }
 
+    /// The number of the frame of the solver that a grab has, and the target of its point, if it is held.
+    pub(crate) fn held(&self, grab: Grab) -> Option<(u32, DVec3)> {
+        let active = self.active.get(grab.slot)?;
+        (active.held && active.user == grab.user).then_some((active.handle, active.to))
+    }
+
+    /// All grabs that are held; `island` is the number of the island.
+    pub(crate) fn all_held(&self, island: usize) -> impl Iterator<Item = Grab> + '_ {
+        let grabs = self.active.iter().enumerate();
+        grabs
+            .filter(|(_, grab)| grab.held)
+            .map(move |(slot, grab)| Grab {
+                island,
+                slot,
+                user: grab.user,
+            })
+    }
+
     /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_to(&mut self, solver: &mut AnySolver, grab: Grab, to: DVec3) -> bool {
         let Some(active) = self.find(grab) else {

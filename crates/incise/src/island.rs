@@ -8,7 +8,7 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh, PieceEvent, PieceTracker, remove_tets};
-use incise_mesh::{ParticleId, TetId, signed_volume};
+use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
 use incise_xpbd::{
     DistanceConstraint, KappaLimit, Real, Solver, StepReport, StepSettings, shortest_substep_of_f32,
 };
@@ -19,6 +19,7 @@ use crate::backend::{AnySolver, each, each_mut};
 use crate::compute_device::ComputeDevice;
 use crate::contacts::Contacts;
 use crate::distance::Distances;
+use crate::forces::Measured;
 use crate::grab::{Grab, Grabs};
 use crate::island_builder::{IslandBuilder, demands, substeps};
 use crate::method::{leaves_open, resolve, tet_solve};
@@ -59,6 +60,8 @@ pub(crate) struct Island {
     /// Frames of removed attachments in the solver, for new ones.
     spare_frames: Vec<u32>,
     pub(crate) distances: Distances,
+    /// The forces of the last frame that measured them.
+    pub(crate) forces: Option<Box<Measured>>,
     /// In a scene with contact.
     pub(crate) contacts: Option<Box<Contacts>>,
     /// The interactive grabs.
@@ -235,6 +238,7 @@ impl Island {
             attachments: joined.attachments,
             spare_frames: Vec::new(),
             distances: joined.distances,
+            forces: None,
             contacts,
             grabs: Grabs::default(),
             volumes,
@@ -471,6 +475,7 @@ impl Island {
         &mut self,
         frame: u64,
         keeping_residuals: bool,
+        measuring_forces: bool,
     ) -> Result<StepReport, Error> {
         let moved = self.sleep.is_some() && self.is_moved(frame);
         if moved {
@@ -481,6 +486,7 @@ impl Island {
         }
         // Its body was removed; its colliders are those of all islands and move on.
         if self.cuttable.mesh().tets.is_empty() {
+            self.forces = None;
             if let Some(contacts) = &mut self.contacts {
                 contacts.end(&mut self.solver)?;
             }
@@ -490,6 +496,7 @@ impl Island {
         for attachment in &self.attachments {
             attachment.advance(frame, &mut self.solver);
         }
+        self.solver.backend_mut().measure_forces(measuring_forces);
         let step = if self.contacts.is_some() {
             self.step_with_contact(keeping_residuals)?
         } else {
@@ -497,6 +504,7 @@ impl Island {
             let backend = self.solver.backend_mut();
             backend.step(schedule, settings, keeping_residuals)?
         };
+        self.forces = measuring_forces.then(|| Measured::of(self)).flatten();
         self.judge_step();
         collider::advance(&mut self.settings);
         self.grabs.arrive();
@@ -581,6 +589,18 @@ impl Island {
         self.bodies[self.body_of[usize::from(material)]]
     }
 
+    /// The box of each body that has tets, with its number in the scene. O(tets).
+    pub(crate) fn boxes(&self) -> BTreeMap<usize, Bounds> {
+        let mut boxes = BTreeMap::new();
+        for (tet, corners) in self.cuttable.mesh().tets.iter().enumerate() {
+            let corners = Bounds::around(corners.map(|p| self.positions[p.index()]));
+            let body = self.body_of_tet(TetId::new(tet));
+            let bounds = boxes.entry(body).or_insert(Bounds::EMPTY);
+            *bounds = bounds.union(corners);
+        }
+        boxes
+    }
+
     /// Removes all tets of a body from the mesh; what depends on the mesh takes the delta.
     pub(crate) fn remove_tets_of(&mut self, body: usize) -> Result<CutDelta, Error> {
         let all = (0..self.cuttable.mesh().tets.len()).map(TetId::new);
@@ -651,6 +671,9 @@ impl Island {
         let spare = self.spare_frames.last().copied();
         attachment.attach(frame, &mut self.solver, spare)?;
         self.spare_frames.pop();
+        if let Some(forces) = &mut self.forces {
+            forces.forget(attachment.number);
+        }
         self.attachments.push(attachment);
         self.wake();
         Ok(())
@@ -724,7 +747,7 @@ impl Island {
     }
 
     /// The piece of a particle, unless it has lost all its tets.
-    fn piece_of(&self, particle: usize) -> Option<u32> {
+    pub(crate) fn piece_of(&self, particle: usize) -> Option<u32> {
         let mut around = self.cuttable.around(ParticleId::new(particle));
         around.next().map(|tet| self.pieces.piece_of(tet))
     }
@@ -744,6 +767,9 @@ impl Island {
         let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
         let Self { grabs, solver, .. } = self;
         let grab = grabs.take(number, solver, &particles, point, compliance)?;
+        if let (Some(forces), Some((handle, _))) = (&mut self.forces, self.grabs.held(grab)) {
+            forces.forget(handle);
+        }
         self.wake();
         Ok(grab)
     }

@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 use incise_cutting::CutError;
+use incise_mesh::Bounds;
 
 use crate::Error;
 use crate::validate::coordinates;
@@ -26,6 +27,9 @@ enum Progress {
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct LiveBlade {
     pose: Vec<DVec3>,
+    /// Box of the poses that frames have carried out.
+    swept: Bounds,
+    has_moved: bool,
     progress: Progress,
 }
 
@@ -36,6 +40,8 @@ impl LiveBlade {
         long_enough(field, pose)?;
         Ok(Self {
             pose: pose.to_vec(),
+            swept: Bounds::EMPTY,
+            has_moved: false,
             progress: Progress::Arrived,
         })
     }
@@ -69,6 +75,11 @@ impl LiveBlade {
         cuts
     }
 
+    /// Returns the box of its path, if it has moved.
+    pub(crate) fn swept(&self) -> Option<Bounds> {
+        self.has_moved.then_some(self.swept)
+    }
+
     pub(crate) fn is_ended(&self) -> bool {
         self.progress == Progress::Ended
     }
@@ -76,6 +87,9 @@ impl LiveBlade {
     /// Notes that a frame has carried out its pose; tells whether its stroke continues.
     pub(crate) fn arrive(&mut self) -> bool {
         let goes_on = !self.is_ended();
+        let pose = Bounds::around(self.pose.iter().copied());
+        self.swept = self.swept.union(pose);
+        self.has_moved |= self.progress != Progress::Arrived;
         self.progress = Progress::Arrived;
         goes_on
     }

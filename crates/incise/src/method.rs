@@ -12,7 +12,7 @@ use crate::accuracy::DEFAULT_ACCURACY;
 use crate::scene::{Integrator, Method, SolverSpec, Substeps, TetSolve};
 use crate::substeps::{Choice, Shortfall};
 use crate::validate::{coordinates, value, within};
-use crate::{Error, Scene, collider};
+use crate::{Error, Scene, collider, forces};
 
 /// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.
 const MOST_ROUNDS: u32 = 20;
@@ -74,6 +74,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         field: "solver".into(),
         source,
     })?;
+    forces::check(&scene.report, solver.method, false)?;
     within("solver.time_step", settings.time_step, 1e-9, 1e3)?;
     Ok(settings)
 }

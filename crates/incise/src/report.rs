@@ -72,6 +72,10 @@ pub struct FrameReport {
     /// Contacts, in a scene that declares contact.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactReport>,
+    /// Forces: on attachments, on the ground, on colliders, on grabs, on what fixed particles are fixed to, then between
+    /// bodies.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub forces: Vec<ForceReport>,
     /// Number of particles that were put back because they would have become Inf or NaN; absent if none. From a device
     /// it is known only in frames that read data back (for a blade or a reported quantity), for all frames since the
     /// last one.
@@ -380,6 +384,72 @@ pub struct ContactForce {
     pub force: DVec3,
     /// The torque of that force about the origin of the world in N·m.
     pub torque: DVec3,
+}
+
+/// The mean force of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct Force {
+    /// The force in N.
+    #[serde(serialize_with = "components")]
+    pub force: DVec3,
+    /// The torque about `point` in N·m.
+    #[serde(serialize_with = "components")]
+    pub torque: DVec3,
+    /// The point in m that the torque is about.
+    #[serde(serialize_with = "components")]
+    pub point: DVec3,
+}
+
+impl Force {
+    /// Moves the torque from the origin of the world to a point.
+    pub(crate) fn new(force: incise_xpbd::Force, point: DVec3) -> Self {
+        Self {
+            force: force.force,
+            torque: force.torque_about(point),
+            point,
+        }
+    }
+}
+
+fn components<S: serde::Serializer>(v: &DVec3, serializer: S) -> Result<S::Ok, S::Error> {
+    v.to_array().serialize(serializer)
+}
+
+/// What a force acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+#[non_exhaustive]
+pub enum ForceKind {
+    /// An attachment.
+    Attachment,
+    /// The ground of the scene.
+    Ground,
+    /// A collider.
+    Collider,
+    /// A grab.
+    Grab,
+    /// What the fixed particles of a body are fixed to.
+    Fixed,
+    /// A body, from another one that touches it.
+    Contact,
+}
+
+/// The mean force of a frame and what it acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
+pub struct ForceReport {
+    /// What the force acts on.
+    pub kind: ForceKind,
+    /// Its number: attachments and colliders in the order of the scene and then of addition, grabs in the order of their
+    /// bodies, bodies in the order of the scene; 0 for the ground.
+    pub index: usize,
+    /// The body that a contact force comes from.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub other: Option<usize>,
+    /// The force.
+    #[serde(flatten)]
+    pub force: Force,
 }
 
 /// Energies in J.

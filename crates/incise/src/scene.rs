@@ -140,6 +140,9 @@ pub enum Quantity {
     /// Squared Courant number of the substep (see `incise_xpbd::Solver::kappa`) and the tets softened to keep its limit,
     /// in all and by body; in a frame with a cut also the values before it.
     Kappa,
+    /// Mean force and torque of the frame on attachments, colliders, the ground, grabs and what fixed particles are fixed
+    /// to, and between bodies that touch. Not on a GPU, nor with method `chebyshev`.
+    Force,
 }
 
 /// Forces and obstacles that act on all bodies.

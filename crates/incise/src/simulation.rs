@@ -5,6 +5,7 @@
 
 mod builder;
 mod edit;
+mod forces;
 mod interaction;
 mod readback;
 mod set_solver;
@@ -207,6 +208,7 @@ impl Simulation {
                 timeline,
                 report: FrameReport::default(),
                 residuals_kept: false,
+                forces_measured: false,
             },
             open_device: OpenDevice::default(),
             deltas: Vec::new(),
@@ -295,6 +297,9 @@ impl Simulation {
 
         let before_solve = Instant::now();
         let (frame, residual) = (self.state.clock.next_frame, self.wants(Quantity::Residual));
+        let force = self.wants(Quantity::Force);
+        // What falls asleep keeps the forces that it sleeps with.
+        let measures = force || (self.sleeps() && self.reports(Quantity::Force));
         let moves = self.state.colliders.take_moves();
         for island in &mut self.state.islands {
             for &(place, to) in &moves {
@@ -307,7 +312,10 @@ impl Simulation {
         }
         let islands = self.state.islands.par_iter_mut();
         let solved = islands
-            .map(|island| island.step(frame, residual).map(|step| step.repaired))
+            .map(|island| {
+                let step = island.step(frame, residual, measures);
+                step.map(|step| step.repaired)
+            })
             .try_reduce(|| 0, |a, b| Ok(a + b));
         for island in &mut self.state.islands {
             for &(place, to) in &moves {
@@ -318,6 +326,7 @@ impl Simulation {
         ms.solve = milliseconds(before_solve.elapsed());
         self.collect_contacts(&mut ms);
         self.state.residuals_kept = residual;
+        self.state.forces_measured = force;
 
         // A device measures what it has; residuals need positions and multipliers of all.
         if !self.state.compute_device.is_gpu() || residual {
@@ -391,9 +400,16 @@ impl Simulation {
     /// Puts the warnings of all islands into the report, and looks for divergence.
     fn collect_warnings(&mut self) {
         let elapsed = self.state.report.time_s;
-        let missed = self.state.timeline.take_missed().into_iter();
-        let missed = missed.map(Warning::of_missed_stroke);
-        self.state.report.warnings.extend(missed);
+        for missed in self.state.timeline.take_missed() {
+            let bodies = self.state.islands.iter().flat_map(Island::boxes);
+            let near = bodies.map(|(body, bounds)| (missed.reach.distance(&bounds), body, bounds));
+            let nearest = near.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            let nearest = nearest.map(|(_, body, bounds)| (body, bounds));
+            let warning = Warning::of_missed_stroke(missed, nearest);
+            self.state.report.warnings.push(warning);
+        }
+        let of_strokes = self.state.timeline.take_warnings();
+        self.state.report.warnings.extend(of_strokes);
         for island in &mut self.state.islands {
             self.state.report.warnings.append(&mut island.warnings);
             let speed = match island.solver.backend().host_max_speed() {
@@ -430,7 +446,12 @@ impl Simulation {
             .clock
             .next_frame
             .is_multiple_of(self.state.reporting.every)
-            && self.state.reporting.quantities.contains(&quantity)
+            && self.reports(quantity)
+    }
+
+    /// Whether some frames report a quantity.
+    fn reports(&self, quantity: Quantity) -> bool {
+        self.state.reporting.quantities.contains(&quantity)
     }
 
     /// Whether substeps are chosen for a body.
@@ -497,7 +518,8 @@ impl Simulation {
     ///
     /// At the start particles and tets are numbered body by body in the order of the scene. Cuts do not change numbers:
     /// the first child of a cut tet takes over its number; other new tets and new particles get the next ones, stroke
-    /// by stroke and within a stroke body by body.
+    /// by stroke and within a stroke body by body. A removal moves the last tets into the gaps and leaves particles without
+    /// tets; [`repair`](incise_mesh::repair) with `drop_unused` makes a mesh without them.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
         match &self.state.merged {

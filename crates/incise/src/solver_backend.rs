@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use incise_graph::Schedule;
-use incise_xpbd::{Energy, Pose, Residuals, StepReport, StepSettings, Volume};
+use incise_xpbd::{Energy, Forces, Pose, Residuals, StepReport, StepSettings, Volume};
 
 use crate::Error;
 use crate::report::Milliseconds;
@@ -44,6 +44,12 @@ pub(crate) trait SolverBackend {
 
     /// The residuals of the last substep, if they were kept.
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
+
+    /// Measures forces in the frames to come, or ends that. A device measures none.
+    fn measure_forces(&mut self, measuring: bool);
+
+    /// The mean forces of the last frame, if they were measured.
+    fn forces(&self) -> Option<Forces>;
 
     /// Sets the pose of a handle at the end of the next frame.
     fn move_handle(&mut self, handle: u32, pose: Pose);

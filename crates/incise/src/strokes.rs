@@ -8,9 +8,11 @@ use incise_cutting::{
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
+use crate::pinned_cut::{find, meets_pinned};
 use crate::scene::{StrokeSpec, pose};
-use crate::tool::{Tool, tool};
+use crate::tool::{MissedStroke, Tool, tool};
 use crate::validate::value;
+use crate::warning::Warning;
 use crate::{Error, Event};
 
 /// A stroke and its progress.
@@ -26,6 +28,8 @@ struct Stroke {
     sweeps: Vec<Sweep>,
     /// Whether it has changed a mesh.
     has_cut: bool,
+    /// Whether it has opened a face with a pinned corner.
+    meets_pinned: bool,
 }
 
 /// The strokes that are not finished.
@@ -42,8 +46,10 @@ pub(crate) struct Timeline {
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
-    /// Strokes of the scene that ended without a cut since they were taken, by their keys in the scene.
-    missed: Vec<String>,
+    /// Strokes that ended without a cut since they were taken.
+    missed: Vec<MissedStroke>,
+    /// Warnings about other strokes that ended since they were taken.
+    warnings: Vec<Warning>,
 }
 
 impl Timeline {
@@ -92,6 +98,7 @@ impl Timeline {
             frames,
             sweeps: Vec::new(),
             has_cut: false,
+            meets_pinned: false,
         });
         self.added += 1;
         Ok(())
@@ -113,11 +120,13 @@ impl Timeline {
     }
 
     /// Ends a live stroke: after the next frame if that has a pose to carry out, or else at once.
-    pub(crate) fn end(&mut self, stroke: u32) -> Result<(), Error> {
+    pub(crate) fn end(&mut self, stroke: u32, islands: &[Island]) -> Result<(), Error> {
         let (place, _, blade) = self.live(stroke)?;
         if !blade.end() {
             let stroke = self.strokes.remove(place);
             self.events.extend(stroke.end());
+            self.missed.extend(stroke.missed());
+            self.warnings.extend(stroke.pinned(islands));
         }
         Ok(())
     }
@@ -158,9 +167,14 @@ impl Timeline {
         std::mem::take(&mut self.events)
     }
 
-    /// The strokes of the scene that have ended without a cut since the last call, by their keys in the scene.
-    pub(crate) fn take_missed(&mut self) -> Vec<String> {
+    /// The strokes that have ended without a cut since the last call.
+    pub(crate) fn take_missed(&mut self) -> Vec<MissedStroke> {
         std::mem::take(&mut self.missed)
+    }
+
+    /// The warnings about strokes that have ended since the last call, other than about missed ones.
+    pub(crate) fn take_warnings(&mut self) -> Vec<Warning> {
+        std::mem::take(&mut self.warnings)
     }
 
     /// Whether a stroke begins or continues in a frame.
@@ -213,9 +227,12 @@ impl Timeline {
                     }
                 }
                 apply_delta(g, island, &delta)?;
+                let stroke = &mut self.strokes[i];
+                stroke.meets_pinned |= meets_pinned(island, &delta, stroke.options.tag);
             }
         }
         let (events, missed) = (&mut self.events, &mut self.missed);
+        let warnings = &mut self.warnings;
         self.strokes.retain_mut(|stroke| {
             let goes_on = match &mut stroke.tool {
                 Tool::Live(blade) => blade.arrive(),
@@ -223,10 +240,8 @@ impl Timeline {
             };
             if !goes_on {
                 events.extend(stroke.end());
-                // A live blade may pass by the bodies.
-                if !stroke.has_cut && !matches!(stroke.tool, Tool::Live(_)) {
-                    missed.push(std::mem::take(&mut stroke.field));
-                }
+                missed.extend(stroke.missed());
+                warnings.extend(stroke.pinned(islands));
             }
             goes_on
         });
@@ -239,6 +254,24 @@ impl Stroke {
     fn end(&self) -> Option<Event> {
         let stroke = self.options.tag;
         self.has_cut.then_some(Event::CutEnded { stroke })
+    }
+
+    /// Returns warnings about cuts that pinned particles keep closed.
+    fn pinned(&self, islands: &[Island]) -> Vec<Warning> {
+        if !self.meets_pinned {
+            return Vec::new();
+        }
+        let cuts = islands
+            .iter()
+            .filter_map(|island| find(island, self.options.tag));
+        cuts.map(|cut| cut.warning(&self.field)).collect()
+    }
+
+    /// Returns the stroke as one that missed all bodies, if it has not cut. A live blade that was not moved did not miss.
+    fn missed(&self) -> Option<MissedStroke> {
+        let reach = self.tool.reach().filter(|_| !self.has_cut)?;
+        let field = self.field.clone();
+        Some(MissedStroke { field, reach })
     }
 
     /// Cuts, or moves, in the island of the given number.
@@ -268,7 +301,7 @@ impl Stroke {
                 sweep(&pose(blade.iter().copied(), path, [first, last], frame))
             }
             Tool::Live(blade) => sweep(blade.pose()),
-            Tool::Surface(surface) => {
+            Tool::Surface { surface, .. } => {
                 cut_surface_joining(cuttable, positions, surface, options, registry)
             }
             Tool::Plane(plane) => cut_plane(cuttable, positions, plane, options),
@@ -283,7 +316,7 @@ impl Stroke {
         })?;
         let joins = matches!(
             self.tool,
-            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface(_)
+            Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface { .. }
         );
         if !joins && !delta.is_empty() {
             registry.apply_delta(&island.cuttable, &delta, &self.options);

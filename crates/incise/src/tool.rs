@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use incise_cutting::{CutError, Plane, TriangleSurface};
+use incise_mesh::Bounds;
 
 use crate::Error;
 use crate::live_blade::{LiveBlade, long_enough};
@@ -14,7 +15,10 @@ use crate::validate::{coordinates, direction, value};
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) enum Tool {
     Plane(Plane),
-    Surface(TriangleSurface),
+    Surface {
+        surface: TriangleSurface,
+        bounds: Bounds,
+    },
     /// The inside is cut off.
     Punch(Solid),
     /// Tets inside are removed.
@@ -28,14 +32,85 @@ pub(crate) enum Tool {
     Live(LiveBlade),
 }
 
+/// The part of space that a tool has passed.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) enum Reach {
+    Box(Bounds),
+    /// A whole plane, or the boundary of a half space.
+    Plane {
+        point: DVec3,
+        normal: DVec3,
+    },
+}
+
+impl Tool {
+    /// The part of space that the tool has passed by the end of its stroke; `None` for a live blade that was not moved.
+    pub(crate) fn reach(&self) -> Option<Reach> {
+        let of_solid = |solid: &Solid| match *solid {
+            Solid::HalfSpace { point, normal } => Reach::Plane { point, normal },
+            Solid::Box { low, high } => Reach::Box(Bounds { low, high }),
+            Solid::Sphere { center, radius } => {
+                Reach::Box(Bounds::around([center]).widened(radius))
+            }
+        };
+        match self {
+            Self::Plane(plane) => Some(Reach::Plane {
+                point: plane.point,
+                normal: plane.normal,
+            }),
+            Self::Surface { bounds, .. } => Some(Reach::Box(*bounds)),
+            Self::Punch(solid) | Self::Remove(solid) => Some(of_solid(solid)),
+            Self::Sweep { blade, path } => {
+                let offsets = Bounds::around(path.iter().copied().map(DVec3::from_array));
+                let blade = Bounds::around(blade.iter().copied());
+                Some(Reach::Box(Bounds {
+                    low: blade.low + offsets.low,
+                    high: blade.high + offsets.high,
+                }))
+            }
+            Self::Live(blade) => blade.swept().map(Reach::Box),
+        }
+    }
+}
+
+/// A stroke that met no tet from its beginning to its end.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct MissedStroke {
+    /// Its key in the scene.
+    pub(crate) field: String,
+    /// Where it was.
+    pub(crate) reach: Reach,
+}
+
+impl Reach {
+    /// Distance to a box in m, 0 where they meet.
+    pub(crate) fn distance(&self, other: &Bounds) -> f64 {
+        match *self {
+            Self::Box(bounds) => {
+                let apart = (bounds.low - other.high).max(other.low - bounds.high);
+                apart.max(DVec3::ZERO).length()
+            }
+            Self::Plane { point, normal } => {
+                let unit = normal.normalize_or_zero();
+                let center = 0.5 * (other.low + other.high);
+                let reach = unit.abs().dot(0.5 * other.size());
+                (unit.dot(center - point).abs() - reach).max(0.0)
+            }
+        }
+    }
+}
+
 /// The tool of a stroke and its snap distance.
 pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error> {
     let point = |key: &str, x: &[f64; 3]| coordinates(&format!("{field}.{key}"), *x);
     let points = |key: &str, list: &[[f64; 3]]| -> Result<Vec<DVec3>, Error> {
         list.iter().map(|x| point(key, x)).collect()
     };
-    let surface = |key: &str, result: Result<TriangleSurface, CutError>| {
-        result.map(Tool::Surface).map_err(|source| Error::Cut {
+    let surface = |key: &str, result: Result<TriangleSurface, CutError>, bounds: Bounds| {
+        let tool = result.map(|surface| Tool::Surface { surface, bounds });
+        tool.map_err(|source| Error::Cut {
             field: format!("{field}.{key}"),
             source,
         })
@@ -63,7 +138,8 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             let center = point("center", center)?;
             let (u, v) = (point("half_u", half_u)?, point("half_v", half_v)?);
             let rectangle = TriangleSurface::rectangle(center, u, v);
-            (surface("half_u", rectangle)?, *snap)
+            let bounds = Bounds::around([u + v, u - v, v - u, -u - v].map(|x| center + x));
+            (surface("half_u", rectangle, bounds)?, *snap)
         }
         StrokeSpec::Surface {
             points: corners,
@@ -72,8 +148,9 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
             ..
         } => {
             let corners = points("points", corners)?;
+            let bounds = Bounds::around(corners.iter().copied());
             let triangles = TriangleSurface::new(&corners, triangles);
-            (surface("triangles", triangles)?, *snap)
+            (surface("triangles", triangles, bounds)?, *snap)
         }
         StrokeSpec::Punch { region, snap, .. } => (Tool::Punch(solid(field, region)?), *snap),
         StrokeSpec::Remove { region, .. } => (Tool::Remove(solid(field, region)?), 0.0),

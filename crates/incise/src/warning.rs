@@ -6,11 +6,14 @@
 
 use std::fmt;
 
+use glam::DVec3;
+use incise_mesh::Bounds;
 use serde::Serialize;
 
 use crate::accuracy::DEFAULT_ACCURACY;
 use crate::scene::SolverSpec;
 use crate::substeps::{Choice, Shortfall};
+use crate::tool::{MissedStroke, Reach};
 
 /// The kind of a [`Warning`], written in JSON as `substeps_capped` and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
@@ -35,8 +38,10 @@ pub enum WarningCode {
     OutsideAccuracy,
     /// A region of the scene contains no particle, or no tet.
     EmptyRegion,
-    /// A stroke of the scene has ended without cutting a tet.
+    /// A stroke has ended without meeting a tet.
     StrokeMissed,
+    /// A stroke has cut where pinned particles keep both sides together.
+    PinnedCut,
     /// The substep is too short for single precision.
     ShortSubstepF32,
     /// Tets were softened to keep `kappa_limit`.
@@ -81,11 +86,36 @@ impl Warning {
         }
     }
 
-    /// The warning about a stroke that cut nothing, at a place like `stroke[0]`.
-    pub(crate) fn of_missed_stroke(field: String) -> Self {
+    /// The warning about a stroke that met no tet, at a place like `stroke[0]`, with the nearest body and its box when
+    /// the stroke ended.
+    pub(crate) fn of_missed_stroke(missed: MissedStroke, nearest: Option<(usize, Bounds)>) -> Self {
+        let MissedStroke { field, reach } = missed;
+        let blade = match reach {
+            Reach::Box(bounds) => format!("it passed {}", box_text(&bounds)),
+            Reach::Plane { point, normal } => {
+                let (point, normal) = (point_text(point), point_text(normal));
+                format!("its plane passes {point} m with normal {normal}")
+            }
+        };
+        let body = match nearest {
+            Some((body, bounds)) => {
+                let distance = reach.distance(&bounds);
+                let apart = if distance > 0.0 {
+                    format!(" at a distance of {} m", rounded(distance))
+                } else {
+                    String::new()
+                };
+                format!(
+                    "the nearest body is body {body}{apart}, in {}{}",
+                    box_text(&bounds),
+                    units_hint(&reach, &bounds)
+                )
+            }
+            None => "there is no body".to_owned(),
+        };
         Self {
             code: WarningCode::StrokeMissed,
-            message: "the stroke has not cut a tet: compare it with the positions of the bodies in its frames".into(),
+            message: format!("the stroke met no tet: {blade}; {body}"),
             location: field,
         }
     }
@@ -101,6 +131,59 @@ impl fmt::Display for Warning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}: {}", self.location, self.message)
     }
+}
+
+/// Ratio of the sizes of a blade and a body from which their units are probably not the same. Units in use differ by 10
+/// (cm and mm) to 1000 (m and mm); a scalpel is rarely 20 times smaller than an organ.
+const OTHER_UNITS: f64 = 30.0;
+
+/// A question about units, if a blade is much larger or smaller than a body or much farther away than the body is large.
+fn units_hint(reach: &Reach, body: &Bounds) -> String {
+    let size = body.size().max_element();
+    let (of_blade, distance) = match reach {
+        Reach::Box(bounds) => (bounds.size().max_element(), reach.distance(body)),
+        Reach::Plane { .. } => (size, reach.distance(body)),
+    };
+    if size <= 0.0 || of_blade <= 0.0 {
+        return String::new();
+    }
+    let times = |ratio: f64| rounded(ratio);
+    let what = if of_blade > OTHER_UNITS * size {
+        format!(
+            "the stroke is {} times as large as the body",
+            times(of_blade / size)
+        )
+    } else if size > OTHER_UNITS * of_blade {
+        format!(
+            "the body is {} times as large as the stroke",
+            times(size / of_blade)
+        )
+    } else if distance > OTHER_UNITS * size {
+        format!(
+            "the distance is {} times the size of the body",
+            times(distance / size)
+        )
+    } else {
+        return String::new();
+    };
+    format!("; {what}: check that both are in m")
+}
+
+/// A number with three significant digits.
+fn rounded(x: f64) -> f64 {
+    format!("{:.2e}", x + 0.0).parse().unwrap_or(x)
+}
+
+fn point_text(x: DVec3) -> String {
+    format!("({}, {}, {})", rounded(x.x), rounded(x.y), rounded(x.z))
+}
+
+pub(crate) fn box_text(bounds: &Bounds) -> String {
+    format!(
+        "the box from {} to {} m",
+        point_text(bounds.low),
+        point_text(bounds.high)
+    )
 }
 
 /// The warning about the substeps of bodies, if their expected error is too large. `wanted` is the accuracy that the

@@ -4,6 +4,7 @@
 //! `usize`. The types are distinct because no other check finds a tet index used as a particle
 //! index.
 
+use std::borrow::Borrow;
 use std::fmt;
 
 macro_rules! id {
@@ -40,6 +41,18 @@ macro_rules! id {
         impl fmt::Display for $name {
             fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
                 write!(f, "{}", self.0)
+            }
+        }
+
+        impl Borrow<u32> for $name {
+            fn borrow(&self) -> &u32 {
+                &self.0
+            }
+        }
+
+        impl Borrow<u32> for &$name {
+            fn borrow(&self) -> &u32 {
+                &self.0
             }
         }
 

@@ -56,6 +56,7 @@ impl<R: Float> Damping<R> {
             velocities: &self.cells,
             multipliers: &[],
             corrections: &[],
+            refused: &particles.refused,
             iterated: false,
             factors,
         };

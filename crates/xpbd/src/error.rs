@@ -54,6 +54,14 @@ pub enum XpbdError {
         /// The name of the method.
         method: &'static str,
     },
+    /// Forces are measured and the method has none.
+    #[error(
+        "forces cannot be measured with method {method}, whose extrapolation moves particles by no force: use another method, or do not measure forces"
+    )]
+    ForceMethod {
+        /// The name of the method.
+        method: &'static str,
+    },
     /// Constraints on particles that do not exist, or a schedule of other constraints.
     #[error("{what} constraints: {source}")]
     Schedule {

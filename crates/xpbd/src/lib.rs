@@ -49,6 +49,7 @@ mod direction;
 mod error;
 mod float;
 mod floating_origin;
+mod forces;
 mod gauss_seidel;
 mod jacobi;
 mod layout;
@@ -79,6 +80,7 @@ pub use error::XpbdError;
 pub use float::Float;
 #[doc(hidden)]
 pub use float::Saved;
+pub use forces::{Force, Forces};
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use pose::Pose;

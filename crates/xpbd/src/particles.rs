@@ -29,6 +29,10 @@ pub(crate) struct Particles<R: Float> {
     pub(crate) velocities: Vec<R::Vector>,
     pub(crate) masses: Vec<f64>,
     pub(crate) fixed: Vec<bool>,
+    /// While forces are measured, of each particle with an inverse mass of 0: the sum of the products of mass and motion
+    /// that constraints would have moved it by. Else empty.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(crate) refused: Vec<R::Particle>,
 }
 
 impl<R: Float> Clone for Particles<R> {
@@ -42,6 +46,7 @@ impl<R: Float> Clone for Particles<R> {
             velocities: self.velocities.clone(),
             masses: self.masses.clone(),
             fixed: self.fixed.clone(),
+            refused: Vec::new(),
         }
     }
 }
@@ -57,6 +62,7 @@ impl<R: Float> Particles<R> {
             velocities: Vec::new(),
             masses: Vec::new(),
             fixed: Vec::new(),
+            refused: Vec::new(),
         }
     }
 
@@ -131,6 +137,27 @@ impl<R: Float> Particles<R> {
         self.weight(particle) > R::ZERO
     }
 
+    /// Begins to keep what held particles are refused.
+    pub(crate) fn keep_refused(&mut self) {
+        self.refused.clear();
+        self.refused
+            .resize_with(self.cells.len(), || R::particle([R::ZERO; 4]));
+    }
+
+    /// Whether what held particles are refused is kept.
+    #[inline]
+    pub(crate) fn keeps_refused(&self) -> bool {
+        !self.refused.is_empty()
+    }
+
+    /// Keeps what a constraint would have moved a particle by, times its mass, if that is held.
+    #[cold]
+    pub(crate) fn refuse(&self, particle: u32, impulse: R::Vector) {
+        if !self.is_free(particle as usize) {
+            add_to::<R>(&self.refused[particle as usize], impulse);
+        }
+    }
+
     /// Recomputes the inverse mass of a particle, which is 0 where it is held; returns whether it has changed.
     pub(crate) fn update_weight(&mut self, particle: usize, attached: bool) -> bool {
         let inverse = R::from_f64(1.0 / self.masses[particle]);
@@ -198,6 +225,13 @@ impl<R: Float> Particles<R> {
             })
             .sum()
     }
+}
+
+/// Adds to the vector of a cell.
+#[inline]
+pub(crate) fn add_to<R: Float>(cell: &R::Particle, change: R::Vector) {
+    let ([x, y, z, w], [a, b, c]) = (R::read(cell), R::components(change));
+    R::write(cell, [x + a, y + b, z + c, w]);
 }
 
 /// The number of a particle, tet or constraint in 32 bits.

@@ -94,6 +94,16 @@ impl Method {
         };
         Err(XpbdError::ContactMethod { method })
     }
+
+    /// Refuses the methods that move particles by more than impulses.
+    pub(crate) fn check_forces(self) -> Result<(), XpbdError> {
+        match self {
+            Self::GaussSeidel | Self::Jacobi => Ok(()),
+            Self::Chebyshev { .. } => Err(XpbdError::ForceMethod {
+                method: "chebyshev",
+            }),
+        }
+    }
 }
 
 impl StepSettings {

@@ -43,6 +43,7 @@ use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask};
 
 use crate::layout::{CONSTANTS, Layout, REST};
 use crate::neo_hookean::{LARGE_STRAIN, MAX_COFACTOR_NORM, SHORTENINGS};
+use crate::particles::add_to;
 use crate::substep::Factors;
 use crate::{Float, TetSolve};
 use memory::{gather, load_multipliers, scatter, splat, store_multipliers};
@@ -58,6 +59,8 @@ pub(crate) struct Pass<'a, R: Float> {
     pub(crate) multipliers: &'a [R::Atomic],
     /// Sums of the corrections of a Jacobi pass, which leaves the particles unchanged; else empty.
     pub(crate) corrections: &'a [R::Particle],
+    /// Of each particle, what it would have been moved by times its mass, if the inverse mass is 0; empty if not kept.
+    pub(crate) refused: &'a [R::Particle],
     /// Whether a substep has more than one iteration, so that multipliers accumulate.
     pub(crate) iterated: bool,
     pub(crate) factors: Factors<R>,
@@ -143,6 +146,13 @@ struct Step<R: Float, S: Simd> {
     change: Matrix<R::Lanes<S>>,
 }
 
+/// What [`move_corners`] is called with, without positions.
+struct Offer<R: Float, S: Simd> {
+    weights: [R::Lanes<S>; 4],
+    change: Matrix<R::Lanes<S>>,
+    gradients: Matrix<R::Lanes<S>>,
+}
+
 /// The tets of one block.
 struct Tets<'a, R: Float, S: Simd> {
     simd: S,
@@ -184,14 +194,17 @@ fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, for
                 tets.split(&x, &q, keeps, &mut multipliers)
             };
             move_corners::<R, S>(&mut x, &change, &q);
+            refuse::<R, S>(pass, block, &x, &change, &q);
         }
         TetSolve::Block => {
             let change = tets.both(&f, &mut multipliers);
             move_corners::<R, S>(&mut x, &change, &q);
+            refuse::<R, S>(pass, block, &x, &change, &q);
         }
         TetSolve::Sequential => {
             let change = tets.deviatoric(&f, &mut multipliers[0]);
             move_corners::<R, S>(&mut x, &change, &q);
+            refuse::<R, S>(pass, block, &x, &change, &q);
             let f = if jacobi {
                 f
             } else {
@@ -199,6 +212,7 @@ fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, for
             };
             let change = tets.hydrostatic(&f, &mut multipliers[1]);
             move_corners::<R, S>(&mut x, &change, &q);
+            refuse::<R, S>(pass, block, &x, &change, &q);
         }
     }
     if keeps {
@@ -236,8 +250,10 @@ fn damp_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
     let f = deformation::<R, S>(&x, &q);
     let change = tets.damped_volume(&f, &deformation::<R, S>(&v, &q));
     move_corners::<R, S>(&mut v, &change, &q);
+    refuse::<R, S>(pass, block, &v, &change, &q);
     let change = tets.damped_shear(&f, &deformation::<R, S>(&v, &q));
     move_corners::<R, S>(&mut v, &change, &q);
+    refuse::<R, S>(pass, block, &v, &change, &q);
     let write = |p: u32, values| R::write(&pass.velocities[p as usize], values);
     scatter::<R, S>(&v, corners, active, write);
 }
@@ -788,6 +804,55 @@ fn move_corners<R: Float, S: Simd>(
         x[1][axis] += x[1][3] * a;
         x[2][axis] += x[2][3] * b;
         x[3][axis] += x[3][3] * c;
+    }
+}
+
+/// Keeps what [`move_corners`] does not move the corners of inverse mass 0 by, if that is asked for.
+#[inline(always)]
+fn refuse<R: Float, S: Simd>(
+    pass: &Pass<'_, R>,
+    block: usize,
+    x: &[[R::Lanes<S>; 4]; 4],
+    change: &Matrix<R::Lanes<S>>,
+    q: &Matrix<R::Lanes<S>>,
+) {
+    if !pass.refused.is_empty() {
+        let offer = Offer {
+            weights: [x[0][3], x[1][3], x[2][3], x[3][3]],
+            change: *change,
+            gradients: *q,
+        };
+        keep_refused(pass, block, &offer);
+    }
+}
+
+/// Compiled once and called with copies, so that a pass that keeps nothing has its registers.
+#[cold]
+#[inline(never)]
+fn keep_refused<R: Float, S: Simd>(pass: &Pass<'_, R>, block: usize, offer: &Offer<R, S>) {
+    let lanes = R::Lanes::<S>::LEN;
+    let blocks = &pass.layout.blocks;
+    let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
+    for (lane, particles) in corners.iter().enumerate() {
+        let weights = [0, 1, 2, 3].map(|k| offer.weights[k][lane]);
+        let is_empty = blocks.active[block] & (1 << lane) == 0;
+        if is_empty || weights.iter().all(|weight| *weight > R::ZERO) {
+            continue;
+        }
+        let products = offer.gradients.map(|gradient| {
+            [0, 1, 2].map(|axis| {
+                offer.change[0][axis][lane] * gradient[0][lane]
+                    + offer.change[1][axis][lane] * gradient[1][lane]
+                    + offer.change[2][axis][lane] * gradient[2][lane]
+            })
+        });
+        let [a, b, c] = products.map(|[x, y, z]| R::vector(x, y, z));
+        let offers = [-(a + b + c), a, b, c];
+        for (k, offered) in offers.into_iter().enumerate() {
+            if weights[k] <= R::ZERO {
+                add_to::<R>(&pass.refused[particles[k] as usize], offered);
+            }
+        }
     }
 }
 

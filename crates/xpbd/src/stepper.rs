@@ -14,6 +14,7 @@ use fearless_simd::Level;
 
 use crate::constraints::Constraints;
 use crate::damping::Damping;
+use crate::forces::ForceMeter;
 use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
@@ -75,6 +76,9 @@ pub(crate) struct Stepper<R: Float> {
     #[cfg_attr(feature = "serde", serde(skip))]
     damping: Damping<R>,
     pub(crate) last: LastSubstep<R>,
+    /// What sums up forces, while they are measured.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub(crate) meter: Option<Box<ForceMeter>>,
 }
 
 impl<R: Float> Default for Stepper<R> {
@@ -89,6 +93,7 @@ impl<R: Float> Default for Stepper<R> {
                 multipliers: Vec::new(),
                 tet_solve: TetSolve::default(),
             },
+            meter: None,
         }
     }
 }
@@ -120,13 +125,24 @@ impl<R: Float> Stepper<R> {
         part: Range<u32>,
         keep: bool,
     ) -> usize {
+        let mut meter = self.meter.take();
+        if let Some(meter) = &mut meter {
+            if part.start == 0 {
+                let (attachments, colliders) = (&constraints.attachments, settings.colliders.len());
+                meter.start(particles, attachments, colliders, settings.time_step);
+            }
+            particles.keep_refused();
+        }
         self.last.clear();
         let (mut repaired, ends) = (0, part.end == settings.substeps);
         for number in part {
             let keep = keep && number + 1 == settings.substeps;
             let substep = Substep::new(settings, number, keep);
-            repaired += self.substep(particles, tets, constraints, &substep, keep);
+            let meter = meter.as_deref_mut();
+            repaired += self.substep(particles, tets, constraints, meter, &substep, keep);
         }
+        particles.refused.clear();
+        self.meter = meter;
         if ends {
             constraints.end_frame();
         }
@@ -138,6 +154,7 @@ impl<R: Float> Stepper<R> {
         particles: &mut Particles<R>,
         tets: &TetSet<R>,
         constraints: &mut Constraints<R>,
+        mut meter: Option<&mut ForceMeter>,
         substep: &Substep<'_, R>,
         keep: bool,
     ) -> usize {
@@ -145,6 +162,9 @@ impl<R: Float> Stepper<R> {
         let time = settings.substep_time();
         let gravity = settings.gravity.map(|g| R::from_dvec3(g * time));
         particles.predict(gravity, R::from_f64(time));
+        if let Some(meter) = meter.as_deref_mut() {
+            meter.begin(particles);
+        }
         let lost = constraints.begin(particles, substep);
         self.multipliers.clear();
         if substep.has_multipliers {
@@ -170,11 +190,26 @@ impl<R: Float> Stepper<R> {
             self.last.multipliers.extend(multipliers);
             self.last.tet_solve = settings.tet_solve;
         }
+        if let Some(meter) = meter.as_deref_mut() {
+            let Constraints {
+                attachments,
+                colliders,
+                ..
+            } = constraints;
+            meter.take_moved(particles, attachments, colliders, 1.0 / time);
+            meter.take_refused(particles, 1.0 / time);
+        }
         let repaired = particles.update_velocities(R::from_f64(time), substep.factors.per_time);
         constraints.end(particles, substep);
+        if let Some(meter) = meter.as_deref_mut() {
+            meter.end(particles, settings.gravity, time);
+        }
         if tets.is_damped() {
             self.damping
                 .damp(particles, &tets.layout, substep.factors, self.level);
+            if let Some(meter) = meter {
+                meter.take_refused(particles, 1.0);
+            }
         }
         lost + repaired
     }
@@ -198,6 +233,7 @@ impl<R: Float> Stepper<R> {
             velocities: &[],
             multipliers,
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
+            refused: &particles.refused,
             iterated: settings.iterations > 1,
             factors: substep.factors,
         };

@@ -1,6 +1,11 @@
 //! The files of `incise run`: the same for any number of threads, whole under their names, usable afterwards.
 
+use std::collections::BTreeSet;
 use std::fs;
+
+use incise::mesh::TetMesh;
+use incise::mesh::glam::DVec3;
+use incise::{Scene, Simulation};
 
 use crate::support::{SCENE, Sandbox};
 
@@ -183,6 +188,47 @@ fn the_last_mesh_is_saved_in_every_format() {
         let info = sandbox.good(&["mesh", "info", name, "--json"]);
         assert!(info.contains("\"pieces\":2"), "{info}");
     }
+}
+
+/// Particles whose tets were all removed are in no saved mesh; the tets are those of the simulation, with the same corners
+/// at the same places.
+#[test]
+fn meshes_saved_after_a_removal_have_no_unused_particles() {
+    let sandbox = Sandbox::new();
+    let scene = SCENE.to_owned()
+        + "[[stroke]]\nkind = \"remove\"\nframe = 2\nregion = { sphere = { center = [0.3, 0.2, 0.1], radius = 0.5 } }\n";
+    sandbox.write("scene.toml", &scene);
+    let mut simulation = Simulation::new(&Scene::from_toml(&scene).unwrap()).unwrap();
+    for _ in 0..4 {
+        simulation.step().unwrap();
+    }
+    let mesh = simulation.mesh();
+    let is_used: BTreeSet<_> = mesh.tets.iter().flatten().collect();
+    let unused = mesh.positions.len() - is_used.len();
+    assert!(unused > 5, "the scene leaves {unused} unused particles");
+    let corners = |mesh: &TetMesh, positions: &[DVec3]| -> Vec<[DVec3; 4]> {
+        let corners = mesh
+            .tets
+            .iter()
+            .map(|tet| tet.map(|p| positions[p.index()]));
+        corners.collect()
+    };
+    let at_rest = corners(mesh, &mesh.positions);
+    let deformed = corners(mesh, simulation.positions());
+    for name in ["last.vtk", "last.vtu", "last.node"] {
+        let run = "run scene.toml --frames 4 --quiet --no-pictures --out out --save-mesh";
+        let arguments: Vec<&str> = run.split(' ').chain([name]).collect();
+        sandbox.good(&arguments);
+        for (name, expected) in [(name, &at_rest), ("out/mesh.vtu", &deformed)] {
+            let saved = incise::mesh_io::read(sandbox.path(name)).unwrap();
+            assert_eq!(saved.positions.len(), is_used.len(), "{name}");
+            assert!(corners(&saved, &saved.positions) == *expected, "{name}");
+        }
+    }
+    // The deformed positions of a .vtu file are as many.
+    let text = sandbox.read("last.vtu");
+    let count = format!("NumberOfPoints=\"{}\"", is_used.len());
+    assert!(text.contains(&count) && text.contains("Name=\"position\""));
 }
 
 #[test]

@@ -11,17 +11,16 @@
 //! a class B, and u moves to C. B keeps its load. A chain has at most one detour, and passes by B
 //! only there, so that its moves still do not meet.
 //!
-//! The graph of classes is never built: a search asks the members of the classes it comes by. A
-//! failed search proves that no direct moves lead from the classes it has seen before its detours
-//! to one light enough for this class, or for a lighter one. Later searches of the round stop
-//! there. A round in which all fail costs a question per vertex for direct moves and one per edge
-//! for detours, and again for those that several searches reach by a detour.
+//! The graph of classes is never built: a search asks the members of the classes that it reaches. Only *loose* vertices
+//! are asked, those with a class that none of their neighbors has; they are listed once and updated around every move.
+//! In a mesh whose colors are as few as its densest particle allows, loose vertices lie near the border. A failed search
+//! proves that no direct moves lead from the classes it has reached before its detours to one light enough for this
+//! class, or for a lighter one. Later searches of the round stop there. A round in which all fail costs a question per
+//! loose vertex for direct moves, and for detours one per neighbor of its neighbors.
 
 use super::partition::{Members, NONE, Partition};
 use super::surroundings::Surroundings;
-
-/// More than one vertex.
-const MANY: u32 = NONE - 1;
+use super::work::Work;
 
 /// How a chain enters a class.
 #[derive(Clone, Copy, Debug)]
@@ -53,8 +52,6 @@ pub(super) struct Chains {
     queue: Vec<u32>,
     /// Class -> how it was reached.
     steps: Vec<Step>,
-    /// Class -> the only neighbor there of the vertex at hand, or [`MANY`].
-    sole: Vec<u32>,
     /// A bit per class: those reached in this search.
     seen: Vec<u64>,
     /// Those reached by direct moves alone, and `dead`.
@@ -65,6 +62,10 @@ pub(super) struct Chains {
     targets: Vec<u64>,
     /// Those that the vertex at hand cannot or need not enter.
     taken: Vec<u64>,
+    /// Neighbors of the vertex at hand that may push it away.
+    pushers: Vec<u32>,
+    /// Neighbors of a vertex that moved.
+    neighbors: Vec<u32>,
 }
 
 impl Chains {
@@ -79,12 +80,13 @@ impl Chains {
             by_weight,
             queue: Vec::new(),
             steps: vec![Step::default(); partition.count()],
-            sole: vec![NONE; partition.count()],
             seen: words.clone(),
             closed: words.clone(),
             dead: words.clone(),
             targets: words.clone(),
             taken: words,
+            pushers: Vec::new(),
+            neighbors: Vec::new(),
         }
     }
 
@@ -94,6 +96,7 @@ impl Chains {
         &mut self,
         partition: &mut Partition<'_>,
         around: &mut impl Surroundings,
+        work: &mut Work,
     ) -> usize {
         let mut members = Members::new(partition.class.len(), partition.count());
         let by_weight = std::mem::take(&mut self.by_weight);
@@ -101,19 +104,23 @@ impl Chains {
         let same =
             |a: &u32, b: &u32| partition.weights[*a as usize] == partition.weights[*b as usize];
         for group in by_weight.chunk_by(same) {
-            for &v in group.iter().rev() {
-                members.link(v, partition.class[v as usize]);
+            for &v in group {
+                if self.is_loose(v, partition, around) {
+                    members.link(v, partition.class[v as usize]);
+                }
             }
             let weight = u64::from(partition.weights[group[0] as usize]);
             loop {
-                let chains = self.round(weight, partition, &mut members, around);
+                let chains = self.round(weight, partition, &mut members, around, work);
                 total += chains;
                 if chains == 0 {
                     break;
                 }
             }
             for &v in group {
-                members.unlink(v, partition.class[v as usize]);
+                if members.contains(v) {
+                    members.unlink(v, partition.class[v as usize]);
+                }
             }
         }
         self.by_weight = by_weight;
@@ -127,13 +134,14 @@ impl Chains {
         partition: &mut Partition<'_>,
         members: &mut Members,
         around: &mut impl Surroundings,
+        work: &mut Work,
     ) -> usize {
         let mut chains = 0;
         self.dead.fill(0);
         loop {
             let alive = (0..)
                 .zip(&partition.loads)
-                .filter(|&(class, _)| !has(&self.dead, class) && members.any(class));
+                .filter(|&(class, _)| !has(&self.dead, class));
             let Some((source, &load)) = alive.max_by_key(|&(class, load)| (load, !class)) else {
                 return chains;
             };
@@ -146,9 +154,11 @@ impl Chains {
             if self.targets.iter().all(|&word| word == 0) {
                 return chains;
             }
-            if let Some(target) = self.search(source, partition, members, around) {
+            if let Some(target) = self.search(source, partition, members, around, work) {
                 chains += 1;
                 self.shift_along_path(source, target, partition, members, around);
+            } else if work.is_spent() {
+                return chains;
             } else {
                 self.dead.copy_from_slice(&self.closed);
             }
@@ -163,20 +173,21 @@ impl Chains {
         partition: &Partition<'_>,
         members: &Members,
         around: &impl Surroundings,
+        work: &mut Work,
     ) -> Option<u32> {
         self.seen.copy_from_slice(&self.dead);
         self.seen[source as usize / 64] |= 1 << (source % 64);
         self.queue.clear();
         self.queue.push(source);
         self.steps[source as usize] = Step::default();
-        let target = self.search_direct(0, partition, members, around);
+        let target = self.search_direct(0, partition, members, around, work);
         if target.is_some() {
             return target;
         }
         self.closed.copy_from_slice(&self.seen);
         let reached = self.queue.len();
-        let target = self.search_detours(partition, members, around);
-        target.or_else(|| self.search_direct(reached, partition, members, around))
+        let target = self.search_detours(partition, members, around, work);
+        target.or_else(|| self.search_direct(reached, partition, members, around, work))
     }
 
     /// Follows direct moves from the classes of the queue, beginning at place `at`.
@@ -186,11 +197,15 @@ impl Chains {
         partition: &Partition<'_>,
         members: &Members,
         around: &impl Surroundings,
+        work: &mut Work,
     ) -> Option<u32> {
         while let Some(&class) = self.queue.get(at) {
             at += 1;
             let detour = self.steps[class as usize].detour;
             for mover in members.of(class) {
+                if !work.spend(1) {
+                    return None;
+                }
                 let step = Step {
                     mover,
                     pusher: NONE,
@@ -211,40 +226,66 @@ impl Chains {
         partition: &Partition<'_>,
         members: &Members,
         around: &impl Surroundings,
+        work: &mut Work,
     ) -> Option<u32> {
-        let reached = self.queue.len();
-        for at in 0..reached {
-            let class = self.queue[at];
-            for pusher in members.of(class) {
-                self.sole.fill(NONE);
-                around.visit_neighbors(pusher, |u| {
-                    let class = partition.class[u as usize];
-                    if class != NONE {
-                        let sole = &mut self.sole[class as usize];
-                        *sole = if *sole == NONE || *sole == u { u } else { MANY };
+        let class_of = |v: u32| partition.class[v as usize];
+        let weight_of = |v: u32| partition.weights[v as usize];
+        let reached = self.closed.iter().zip(&self.dead);
+        let reached: Vec<u64> = reached.map(|(closed, dead)| closed & !dead).collect();
+        let mut pushers = std::mem::take(&mut self.pushers);
+        for (detour, _) in (0..).zip(&partition.loads) {
+            // No chain continues from a closed class.
+            if has(&self.closed, detour) {
+                continue;
+            }
+            for mover in members.of(detour) {
+                pushers.clear();
+                around.visit_neighbors(mover, |v| {
+                    let class = class_of(v);
+                    if class != NONE && has(&reached, class) && weight_of(v) == weight_of(mover) {
+                        pushers.push(v);
                     }
                 });
-                for (detour, index) in (0..).zip(0..self.sole.len()) {
-                    let mover = self.sole[index];
-                    let pushes = mover != NONE
-                        && mover != MANY
-                        && partition.weights[mover as usize] == partition.weights[pusher as usize];
-                    // No chain continues from a closed class.
-                    if pushes && !has(&self.closed, detour) {
-                        let step = Step {
-                            mover,
-                            pusher,
-                            detour,
-                        };
-                        let target = self.open(step, partition, around);
-                        if target.is_some() {
-                            return target;
-                        }
+                // A graph and its incidence list neighbors in different orders, an incidence some of them twice.
+                pushers.sort_unstable();
+                pushers.dedup();
+                if !work.spend(1 + pushers.len()) {
+                    self.pushers = pushers;
+                    return None;
+                }
+                let pusher = pushers.iter().copied().find(|&pusher| {
+                    let mut is_sole = true;
+                    around.visit_neighbors(pusher, |u| {
+                        is_sole &= u == mover || class_of(u) != detour;
+                    });
+                    is_sole
+                });
+                if let Some(pusher) = pusher {
+                    let step = Step {
+                        mover,
+                        pusher,
+                        detour,
+                    };
+                    let target = self.open(step, partition, around);
+                    if target.is_some() {
+                        self.pushers = pushers;
+                        return target;
                     }
                 }
             }
         }
+        self.pushers = pushers;
         None
+    }
+
+    /// Whether there is a class that a vertex could enter.
+    fn is_loose(&mut self, v: u32, partition: &Partition<'_>, around: &impl Surroundings) -> bool {
+        self.taken.fill(0);
+        around.add_taken(v, &partition.class, &mut self.taken);
+        let own = partition.class[v as usize];
+        self.taken[own as usize / 64] |= 1 << (own % 64);
+        let taken: u32 = self.taken.iter().map(|word| word.count_ones()).sum();
+        (taken as usize) < partition.count()
     }
 
     /// Adds to the queue the classes that the mover of `step` can enter; the lightest target among
@@ -281,30 +322,61 @@ impl Chains {
 
     /// Makes the moves that lead to `target`, the last one first.
     fn shift_along_path(
-        &self,
+        &mut self,
         source: u32,
         target: u32,
         partition: &mut Partition<'_>,
         members: &mut Members,
         around: &mut impl Surroundings,
     ) {
-        let mut shift = |v: u32, to: u32| {
-            let from = partition.class[v as usize];
-            around.leave(v, from);
-            around.enter(v, to);
-            members.unlink(v, from);
-            members.link(v, to);
-            partition.shift(v, to);
-            from
-        };
         let mut to = target;
         while to != source {
             let Step { mover, pusher, .. } = self.steps[to as usize];
-            to = shift(mover, to);
+            to = self.shift(mover, to, partition, members, around);
             if pusher != NONE {
-                to = shift(pusher, to);
+                to = self.shift(pusher, to, partition, members, around);
             }
         }
+    }
+
+    /// Moves a vertex to a class, and updates which vertices around it are loose; returns the class that it left.
+    fn shift(
+        &mut self,
+        v: u32,
+        to: u32,
+        partition: &mut Partition<'_>,
+        members: &mut Members,
+        around: &mut impl Surroundings,
+    ) -> u32 {
+        let from = partition.class[v as usize];
+        around.leave(v, from);
+        around.enter(v, to);
+        if members.contains(v) {
+            // The next search goes on behind this vertex: those before it had no way out.
+            members.start_at(v, from);
+            members.unlink(v, from);
+        }
+        partition.shift(v, to);
+        let mut neighbors = std::mem::take(&mut self.neighbors);
+        neighbors.clear();
+        neighbors.push(v);
+        around.visit_neighbors(v, |u| neighbors.push(u));
+        neighbors.sort_unstable();
+        neighbors.dedup();
+        let weight = partition.weights[v as usize];
+        for &u in &neighbors {
+            let class = partition.class[u as usize];
+            if class == NONE || partition.weights[u as usize] != weight {
+                continue;
+            }
+            match (members.contains(u), self.is_loose(u, partition, around)) {
+                (false, true) => members.link(u, class),
+                (true, false) => members.unlink(u, class),
+                _ => {}
+            }
+        }
+        self.neighbors = neighbors;
+        from
     }
 }
 

@@ -10,6 +10,7 @@
 
 use super::partition::{Members, NONE, Partition};
 use super::surroundings::Surroundings;
+use super::work::Work;
 
 /// A connected piece of two classes.
 #[derive(Clone, Copy, Debug)]
@@ -55,6 +56,7 @@ impl Flips {
         &mut self,
         partition: &mut Partition<'_>,
         around: &mut impl Surroundings,
+        work: &mut Work,
     ) -> usize {
         let mut members = Members::new(partition.class.len(), partition.count());
         for (v, &class) in (0..).zip(&partition.class) {
@@ -68,8 +70,12 @@ impl Flips {
         for &heavy in order.iter().rev() {
             for &light in &order {
                 if partition.loads[heavy as usize] > partition.loads[light as usize] + 1 {
+                    if work.is_spent() {
+                        return pairs;
+                    }
                     self.split(heavy, light, partition, &members, around);
                     self.choose(partition.loads[heavy as usize] - partition.loads[light as usize]);
+                    work.spend(self.vertices.len());
                     let flipped = self.flip(heavy, light, partition, &mut members, around);
                     pairs += usize::from(flipped);
                 }

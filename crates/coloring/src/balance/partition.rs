@@ -79,7 +79,7 @@ impl<'a> Partition<'a> {
     }
 }
 
-/// The members of every class, linked both ways.
+/// The members of every class, in a ring.
 #[derive(Debug)]
 pub(super) struct Members {
     first: Vec<u32>,
@@ -97,39 +97,51 @@ impl Members {
         }
     }
 
-    /// Puts `v` at the front of a class.
+    /// Inserts `v` at the end of a class.
     pub(super) fn link(&mut self, v: u32, class: u32) {
-        let first = std::mem::replace(&mut self.first[class as usize], v);
-        self.next[v as usize] = first;
-        self.previous[v as usize] = NONE;
-        if first != NONE {
-            self.previous[first as usize] = v;
+        let first = self.first[class as usize];
+        if first == NONE {
+            self.first[class as usize] = v;
+            (self.next[v as usize], self.previous[v as usize]) = (v, v);
+            return;
         }
+        let last = std::mem::replace(&mut self.previous[first as usize], v);
+        self.next[last as usize] = v;
+        (self.next[v as usize], self.previous[v as usize]) = (first, last);
     }
 
-    /// Takes `v` from its class.
+    /// Removes `v` from its class. If it was the first, the next one is.
     pub(super) fn unlink(&mut self, v: u32, class: u32) {
         let (next, previous) = (self.next[v as usize], self.previous[v as usize]);
-        if next != NONE {
-            self.previous[next as usize] = previous;
+        self.next[v as usize] = NONE;
+        if next == v {
+            self.first[class as usize] = NONE;
+            return;
         }
-        if previous == NONE {
+        self.previous[next as usize] = previous;
+        self.next[previous as usize] = next;
+        if self.first[class as usize] == v {
             self.first[class as usize] = next;
-        } else {
-            self.next[previous as usize] = next;
         }
     }
 
-    /// Has the class any member?
-    pub(super) fn any(&self, class: u32) -> bool {
-        self.first[class as usize] != NONE
+    /// Whether `v` is a member of a class.
+    pub(super) fn contains(&self, v: u32) -> bool {
+        self.next[v as usize] != NONE
     }
 
-    /// The members of a class, front to back.
+    /// Makes `v` the first member of its class; the order around the ring stays.
+    pub(super) fn start_at(&mut self, v: u32, class: u32) {
+        self.first[class as usize] = v;
+    }
+
+    /// The members of a class, first to last.
     pub(super) fn of(&self, class: u32) -> impl Iterator<Item = u32> {
-        let some = |v: u32| (v != NONE).then_some(v);
-        std::iter::successors(some(self.first[class as usize]), move |&v| {
-            some(self.next[v as usize])
-        })
+        let first = self.first[class as usize];
+        let following = move |&v: &u32| {
+            let next = self.next[v as usize];
+            (next != first).then_some(next)
+        };
+        std::iter::successors((first != NONE).then_some(first), following)
     }
 }

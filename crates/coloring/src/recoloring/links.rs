@@ -190,13 +190,21 @@ impl Links {
         std::iter::successors(first, |link| self.links.get(link.next_at_particle as usize))
     }
 
-    /// The particle of each link of a vertex.
-    pub(super) fn of(&self, v: u32) -> impl Iterator<Item = u32> + Clone {
+    fn links_of(&self, v: u32) -> impl Iterator<Item = &Link> + Clone {
         let first = self.of_vertex.get(v as usize);
         let first = first.and_then(|&first| self.links.get(first as usize));
-        let links =
-            std::iter::successors(first, |link| self.links.get(link.next_of_vertex as usize));
-        links.map(|link| link.particle)
+        std::iter::successors(first, |link| self.links.get(link.next_of_vertex as usize))
+    }
+
+    /// The particle of each link of a vertex.
+    pub(super) fn of(&self, v: u32) -> impl Iterator<Item = u32> + Clone {
+        self.links_of(v).map(|link| link.particle)
+    }
+
+    /// The particles of a vertex, each as often as it was added and not removed.
+    pub(super) fn repeated(&self, v: u32) -> impl Iterator<Item = u32> {
+        let links = self.links_of(v);
+        links.flat_map(|link| std::iter::repeat_n(link.particle, link.count as usize))
     }
 
     /// The neighbors of a vertex, some of them several times.

@@ -18,9 +18,11 @@
 mod links;
 mod taken;
 
+use std::borrow::Borrow;
 use std::cmp::Reverse;
+use std::collections::BTreeSet;
 
-use incise_graph::{ColorId, Coloring, Incidence};
+use incise_graph::{Classes, ColorId, Coloring, Incidence};
 
 use crate::conflicts::UNCOLORED;
 use crate::{ColoringError, auto};
@@ -83,6 +85,8 @@ pub struct Recoloring {
     /// The number of colors after the last full coloring.
     reference: usize,
     slack: usize,
+    /// The vertices without particles.
+    vacant: BTreeSet<u32>,
     /// Vertices that an edit leaves without a color, and the color that they had.
     waiting: Vec<(u32, ColorId)>,
     /// Those that cannot keep it, by the valences of their particles.
@@ -156,9 +160,13 @@ impl Recoloring {
             sizes: Vec::new(),
             reference: 0,
             slack,
+            vacant: BTreeSet::new(),
             waiting: Vec::new(),
             by_bound: Vec::new(),
         };
+        let all = (0..).take(recoloring.links.vertex_count());
+        let vacant = all.filter(|&v| !recoloring.links.has(v));
+        recoloring.vacant = vacant.collect();
         recoloring.count();
         recoloring
     }
@@ -167,6 +175,15 @@ impl Recoloring {
     #[must_use]
     pub fn coloring(&self) -> &Coloring {
         &self.coloring
+    }
+
+    /// Returns the constraints of each color, ascending. Numbers without particles, such as those of removed
+    /// constraints, are left out, while [`coloring`](Self::coloring) has a color for every number. O(vertices +
+    /// colors).
+    #[must_use]
+    pub fn classes(&self) -> Classes {
+        let is_present = |v| u32::try_from(v).is_ok_and(|v| self.links.has(v));
+        self.coloring.classes_of(is_present)
     }
 
     /// Returns the number of colors, the largest label plus one. O(1).
@@ -209,12 +226,75 @@ impl Recoloring {
         for v in (0..).take(vertices).skip(before) {
             self.coloring.push(UNCOLORED);
             self.set(v, ColorId(0));
+            self.vacant.insert(v);
         }
+    }
+
+    /// Adds constraints, each given by its particles, and colors them. Returns their numbers: the smallest that no
+    /// constraint has. Cost: see the [report](Recolored).
+    ///
+    /// # Errors
+    /// If a constraint has no particle. Nothing is changed then.
+    ///
+    /// ```
+    /// use incise_coloring::Recoloring;
+    /// use incise_graph::Incidence;
+    ///
+    /// let springs = Incidence::from_constraints(5, [[0u32, 1], [1, 2], [2, 3], [3, 4]])?;
+    /// let mut recoloring = Recoloring::new(&springs, 1);
+    /// recoloring.remove(&[1])?;
+    /// assert_eq!(recoloring.classes().values().len(), 3);
+    /// let (numbers, report) = recoloring.add([[1u32, 3], [0, 4]])?;
+    /// assert_eq!((numbers, report.colored), (vec![1, 4], 2));
+    /// for springs in recoloring.classes().iter() {
+    ///     // These share no particle: solve them in parallel.
+    ///     assert!(springs.len() <= 2);
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn add(
+        &mut self,
+        constraints: impl IntoIterator<Item = impl IntoIterator<Item = impl Borrow<u32>>>,
+    ) -> Result<(Vec<u32>, Recolored), ColoringError> {
+        let next = (0..).skip(self.links.vertex_count());
+        let mut free = self.vacant.iter().copied().chain(next);
+        let (mut numbers, mut added) = (Vec::new(), Vec::new());
+        for (constraint, vertex) in constraints.into_iter().zip(&mut free) {
+            let first = added.len();
+            let particles = constraint.into_iter().map(|particle| *particle.borrow());
+            added.extend(particles.map(|particle| (vertex, particle)));
+            if added.len() == first {
+                let vertex = u32::try_from(numbers.len()).unwrap_or(u32::MAX);
+                return Err(ColoringError::NoParticles { vertex });
+            }
+            numbers.push(vertex);
+        }
+        let report = self.apply(&[], &added)?;
+        Ok((numbers, report))
+    }
+
+    /// Removes constraints by their numbers, which [`add`](Self::add) may give to others. The rest keep their colors.
+    /// O(particles of the removed constraints).
+    ///
+    /// # Errors
+    /// If a number is that of no constraint, or is given twice. Nothing is changed then.
+    pub fn remove(&mut self, constraints: &[u32]) -> Result<Recolored, ColoringError> {
+        let mut removed = Vec::new();
+        for &vertex in constraints {
+            if !self.links.has(vertex) {
+                return Err(ColoringError::NoParticles { vertex });
+            }
+            let particles = self.links.repeated(vertex);
+            removed.extend(particles.map(|particle| (vertex, particle)));
+        }
+        self.apply(&removed, &[])
     }
 
     /// Removes and adds (vertex, particle) pairs and colors the vertices that need a new color.
     ///
-    /// Removals come first. A vertex is removed by removing all its pairs, moved to a copy of a
+    /// This is [`add`](Self::add) and [`remove`](Self::remove) in one edit, for a caller that has numbers of its own;
+    /// numbers that are skipped are vertices without particles. Removals come first. A vertex is removed by removing
+    /// all its pairs, moved to a copy of a
     /// particle by removing one pair and adding another. Pairs may repeat: a cluster has one for
     /// each of its constraints at a particle. Cost: see the
     /// [report](Recolored); if [`limit`](Self::limit) is exceeded, that of [`recolor`](Self::recolor).
@@ -237,6 +317,7 @@ impl Recoloring {
             if !self.links.has(v) {
                 self.set(v, ColorId(0));
                 self.changed.push(v);
+                self.vacant.insert(v);
             }
         }
         let mut waiting = std::mem::take(&mut self.waiting);
@@ -321,7 +402,11 @@ impl Recoloring {
             sizes[color.index()] += 1;
         }
         let at_particles = self.taken.agrees_with(&self.recomputed_taken());
-        if sizes == self.sizes && at_particles && self.links.counts_agree(&incidence) {
+        let vacant = (0..).take(self.links.vertex_count());
+        let vacant = vacant.filter(|&v| !self.links.has(v));
+        let are_vacant = self.vacant.iter().copied().eq(vacant);
+        if sizes == self.sizes && at_particles && are_vacant && self.links.counts_agree(&incidence)
+        {
             Ok(())
         } else {
             Err(ColoringError::InconsistentCounts)
@@ -365,6 +450,9 @@ impl Recoloring {
             // A vertex without particles has no color to keep, and its links are all of this run: they come first at
             // particles.
             let is_new = !self.links.has(v);
+            if is_new {
+                self.vacant.remove(&v);
+            }
             for &(_, particle) in run {
                 let known = if is_new {
                     self.links.repeat_last(v, particle)

@@ -135,12 +135,17 @@ impl Simulation {
         self.state.colliders.remove(index);
         for island in &mut self.state.islands {
             island.settings.colliders.remove(index);
+            if let Some(forces) = &mut island.forces
+                && index < forces.colliders.len()
+            {
+                forces.colliders.remove(index);
+            }
             island.wake();
         }
         Ok(())
     }
 
-    fn collider_index(&self, handle: ColliderHandle) -> Result<usize, Error> {
+    pub(super) fn collider_index(&self, handle: ColliderHandle) -> Result<usize, Error> {
         let index = self.state.colliders.index(handle);
         index.ok_or_else(|| removed("collider", handle))
     }

@@ -69,7 +69,7 @@ impl Simulation {
     /// # Errors
     /// If the stroke was not begun by [`Simulation::begin_stroke`] or has ended.
     pub fn end_stroke(&mut self, stroke: u32) -> Result<(), Error> {
-        self.state.timeline.end(stroke)
+        self.state.timeline.end(stroke, &self.state.islands)
     }
 
     /// Grabs the body at a point, to move it interactively; `None` if there is no particle to grab.

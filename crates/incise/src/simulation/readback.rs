@@ -63,11 +63,16 @@ impl Simulation {
                     report.inverted_tets = Some(volume.inverted);
                 }
                 Quantity::Speed => report.max_speed = Some(max_speed(&states)),
+                // They are read off below: it takes all of the simulation.
+                Quantity::Force => {}
                 Quantity::Kappa => {
                     report.kappa = Some(kappa(&self.state.islands));
                     report.softened = Some(softened(&self.state.islands));
                 }
             }
+        }
+        if self.state.forces_measured {
+            self.state.report.forces = self.forces();
         }
         Ok(())
     }

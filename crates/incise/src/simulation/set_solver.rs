@@ -22,7 +22,7 @@ use crate::island_builder::substeps;
 use crate::method::{leaves_open, resolve, settings};
 use crate::partition::{Partition, PartitionSettings};
 use crate::recluster::Recluster;
-use crate::scene::{Method, Precision, ReportSpec, SolverSpec, Substeps};
+use crate::scene::{Method, Precision, SolverSpec, Substeps};
 use crate::sleep::SleepState;
 use crate::substeps::Choice;
 use crate::validate::value;
@@ -105,11 +105,11 @@ impl Simulation {
             );
             return Err(value("solver.precision", solver.precision.name(), range));
         }
-        // Strokes are under way, and reports are not the solver's business.
+        // Strokes are under way. Some methods and devices do not have every quantity of a report.
         let scene = Scene {
             solver: solver.clone(),
             stroke: Vec::new(),
-            report: ReportSpec::default(),
+            report: self.state.reporting.clone(),
             ..(*self.state.scene).clone()
         };
         let settings = settings(&scene)?;

@@ -19,9 +19,9 @@ use crate::island::Island;
 use crate::merged_mesh::MergedMesh;
 use crate::recluster::Recluster;
 use crate::report::FrameReport;
-use crate::scene::ReportSpec;
+use crate::scene::{Quantity, ReportSpec};
 use crate::validate::value;
-use crate::{Error, Scene};
+use crate::{Error, Scene, forces};
 
 /// A copy of the state of a simulation, to undo, fork or save: see [`Simulation::snapshot`].
 #[derive(Clone, Debug)]
@@ -248,13 +248,20 @@ impl Simulation {
         Ok(simulation)
     }
 
-    /// Sets the reported quantities and their interval from the next frame on.
+    /// Sets the reported quantities and their interval from the next frame on. Wakes all bodies if forces are reported
+    /// for the first time, since sleeping bodies have none.
     ///
     /// # Errors
-    /// If `every` is 0; nothing has changed then.
+    /// If `every` is 0, or forces are reported on a GPU or with method `chebyshev`; nothing has changed then.
     pub fn set_report(&mut self, report: ReportSpec) -> Result<(), Error> {
         if report.every == 0 {
             return Err(value("report.every", 0, "at least 1"));
+        }
+        let is_gpu = self.state.compute_device.is_gpu();
+        forces::check(&report, self.state.solver.method, is_gpu)?;
+        let asks = |report: &ReportSpec| report.quantities.contains(&Quantity::Force);
+        if asks(&report) && !asks(&self.state.reporting) {
+            self.state.islands.iter_mut().for_each(Island::wake);
         }
         self.state.reporting = report;
         Ok(())

@@ -54,6 +54,8 @@ pub(super) struct State {
     pub(super) report: FrameReport,
     /// Whether the solvers have the residuals of the last frame.
     pub(super) residuals_kept: bool,
+    /// Whether the islands have the forces of the last frame.
+    pub(super) forces_measured: bool,
 }
 
 /// A body that a program removed.

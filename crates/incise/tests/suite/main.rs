@@ -13,6 +13,7 @@ mod contact;
 mod cutting;
 mod determinism;
 mod edits;
+mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 #[cfg(feature = "gpu")]

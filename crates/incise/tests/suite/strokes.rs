@@ -3,7 +3,7 @@
 use incise::cutting::{FaceTag, Skin};
 use incise::mesh::glam::DVec3;
 use incise::report::PieceReport;
-use incise::{Scene, Simulation, WarningCode};
+use incise::{FrameReport, Scene, Simulation, Warning, WarningCode};
 
 use crate::support::{body, plane, simulation, sweep};
 
@@ -201,7 +201,8 @@ fn bites_that_leave_parts_hanging() {
     assert!(came_apart > 5, "{came_apart} removals separated something");
 }
 
-/// A stroke beside the body is named in the frame in which it ends, one that cuts is not, and a live blade may miss.
+/// A stroke beside the body is named in the frame in which it ends, one that cuts is not. A live blade is named if it was
+/// moved.
 #[test]
 fn strokes_that_cut_nothing_are_named() {
     let text = format!(
@@ -216,19 +217,219 @@ fn strokes_that_cut_nothing_are_named() {
         ),
     );
     let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
-    let blade = [DVec3::new(5.0, 0.0, 0.0), DVec3::new(5.0, 1.0, 0.0)];
-    let live = simulation.begin_stroke(&blade, 0.1).unwrap();
+    let blade = |z: f64| [DVec3::new(5.0, 0.0, z), DVec3::new(5.0, 1.0, z)];
+    let [moved, unmoved] = [0.1, 0.1].map(|snap| simulation.begin_stroke(&blade(0.0), snap));
+    let (moved, unmoved) = (moved.unwrap(), unmoved.unwrap());
     let mut named = Vec::new();
     for frame in 0..6 {
-        if frame == 3 {
-            simulation.end_stroke(live).unwrap();
+        if frame == 2 {
+            simulation.move_blade(moved, &blade(0.5)).unwrap();
         }
-        let report = simulation.step().unwrap();
-        let missed = report.warnings().iter();
-        let missed = missed.filter(|w| w.code == WarningCode::StrokeMissed);
-        named.extend(missed.map(|w| (report.frame, w.location.clone())));
+        if frame == 4 {
+            simulation.end_stroke(moved).unwrap();
+            simulation.end_stroke(unmoved).unwrap();
+        }
+        let missed = missed(simulation.step().unwrap());
+        let frame = simulation.report().frame;
+        named.extend(missed.into_iter().map(|w| (frame, w.location)));
     }
-    assert_eq!(named, [(2, "stroke[1]".into()), (3, "stroke[2]".into())]);
+    let expected = [(2, "stroke[1]"), (3, "stroke[2]"), (4, "stroke[3]")];
+    assert_eq!(
+        named,
+        expected.map(|(frame, name)| (frame, name.to_owned()))
+    );
+}
+
+fn missed(report: &FrameReport) -> Vec<Warning> {
+    let missed = report.warnings().iter();
+    let missed = missed.filter(|w| w.code == WarningCode::StrokeMissed);
+    missed.cloned().collect()
+}
+
+/// The warning has the box that the stroke passed and that of the nearest body, in the numbers of the scene, and asks for
+/// the units where sizes differ a lot.
+#[test]
+fn a_missed_stroke_names_its_box_and_that_of_the_body() {
+    let text = |body: &str, stroke: &str| {
+        let scene = format!(
+            "{body}[[body]]\nshape = {{ kind = \"box\", tets = 300 }}\nposition = [0.0, 0.0, 40.0]\n{stroke}"
+        );
+        let mut simulation = simulation(&Scene::from_toml(&scene).unwrap());
+        let frames = (0..4).map(|_| missed(simulation.step().unwrap()));
+        let warnings: Vec<Warning> = frames.flatten().collect();
+        assert_eq!(warnings.len(), 1, "{warnings:?}");
+        warnings[0].message.clone()
+    };
+    let cube = body("box", 300, [0.0; 3]);
+    let around = "the nearest body is body 0";
+    // A path in mm.
+    let blade = [[-1000.0, 1000.0, 600.0], [1000.0, 1000.0, 600.0]];
+    let message = text(&cube, &sweep([1, 3], blade, [0.0, 500.0, -1200.0]));
+    assert!(
+        message.contains("the box from (-1000, 1000, -600) to (1000, 1500, 600) m"),
+        "{message}"
+    );
+    assert!(
+        message.contains(around)
+            && message.contains("in the box from (-0.5, -0.5, -0.5) to (0.5, 0.5, 0.5) m"),
+        "{message}"
+    );
+    assert!(
+        message.contains("the stroke is 2000 times as large as the body: check that both are in m"),
+        "{message}"
+    );
+    // A miss by a little says nothing of units.
+    let blade = [[-1.0, 0.6, 0.6], [1.0, 0.6, 0.6]];
+    let message = text(&cube, &sweep([1, 3], blade, [0.0, 0.0, -1.2]));
+    assert!(
+        message.contains("body 0 at a distance of 0.1 m"),
+        "{message}"
+    );
+    assert!(!message.contains("times"), "{message}");
+    // A body in mm.
+    let large = cube
+        .replace("young", "scale = 1000.0\nyoung")
+        .replace("position = [0.0, 0.0, 0.0]", "position = [0.0, 0.0, 600.0]");
+    let message = text(
+        &large,
+        &sweep(
+            [1, 3],
+            [[-1.0, 0.6, 38.0], [1.0, 0.6, 38.0]],
+            [0.0, 0.0, -1.2],
+        ),
+    );
+    assert!(message.contains("the nearest body is body 1"), "{message}");
+    // Planes have no box; a far one is far in sizes of the body.
+    let message = text(&cube, &plane(1, [90.0, 0.0, 0.0], [2.0, 0.0, 0.0]));
+    assert!(
+        message.contains("its plane passes (90, 0, 0) m with normal (1, 0, 0)"),
+        "{message}"
+    );
+    assert!(
+        message.contains("the distance is 89.5 times the size of the body"),
+        "{message}"
+    );
+    // Other kinds.
+    let rectangle = "[[stroke]]\nkind = \"rectangle\"\nframe = 1\ncenter = [2.0, 0.0, 0.0]\nhalf_u = [0.0, 0.6, 0.1]\nhalf_v = [0.0, -0.1, 0.6]\n";
+    let message = text(&cube, rectangle);
+    assert!(
+        message.contains("the box from (2, -0.7, -0.7) to (2, 0.7, 0.7) m"),
+        "{message}"
+    );
+    let punch = "[[stroke]]\nkind = \"punch\"\nframe = 1\nregion = { sphere = { center = [2.0, 0.0, 0.0], radius = 0.25 } }\n";
+    let message = text(&cube, punch);
+    assert!(
+        message.contains("the box from (1.75, -0.25, -0.25) to (2.25, 0.25, 0.25) m"),
+        "{message}"
+    );
+}
+
+/// The warnings of planes across a body that is pinned below z = -0.2, in the frame after the cut.
+fn pinned_cuts(pinned: &str, strokes: &str, shape: &str) -> Vec<Warning> {
+    let text = format!(
+        "{}{pinned}\n{strokes}",
+        body(shape, 4000, [0.0; 3]).replace("[[body]]", "[[body]]\n")
+    );
+    let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
+    let mut warnings = Vec::new();
+    for _ in 0..6 {
+        let report = simulation.step().unwrap();
+        let pinned = report.warnings().iter();
+        let pinned = pinned.filter(|w| w.code == WarningCode::PinnedCut);
+        warnings.extend(pinned.cloned());
+    }
+    simulation.check().unwrap();
+    warnings
+}
+
+const BELOW: &str = "{ half_space = { point = [0, 0, -0.2], normal = [0, 0, -1] } }";
+
+/// A plane in a pinned region, or so little inside that only a rim of particles is above it, frees nothing.
+#[test]
+fn planes_inside_a_pinned_region_are_named() {
+    let fixed = format!("fixed = [{BELOW}]");
+    for shape in ["box", "sphere"] {
+        // A mean edge is about 0.1.
+        for (depth, normal) in [
+            (0.12, [0.0, 0.0, 1.0]),
+            (0.05, [0.0, 0.05, 1.0]),
+            (0.02, [0.0, 0.0, 1.0]),
+            (0.01, [0.0, 0.05, 1.0]),
+        ] {
+            let stroke = plane(1, [0.0, 0.0, -0.2 - depth], normal);
+            let warnings = pinned_cuts(&fixed, &stroke, shape);
+            assert_eq!(warnings.len(), 1, "{shape}, depth {depth}: {warnings:?}");
+            let Warning {
+                message, location, ..
+            } = &warnings[0];
+            assert_eq!(location, "stroke[0]");
+            assert!(
+                message.contains("body[0].fixed") && message.contains("in the box from ("),
+                "{message}"
+            );
+        }
+    }
+    // An attachment pins as well, and a sweep is judged when it ends.
+    let attachment = format!(
+        "[[attachment]]\nregions = [{BELOW}]\nframes = [0, 9]\npath = [[0, 0, 0], [0, 0, 0.1]]\n"
+    );
+    let stroke = sweep(
+        [1, 3],
+        [[-1.0, -0.7, -0.25], [1.0, -0.7, -0.25]],
+        [0.0, 1.4, 0.0],
+    );
+    let warnings = pinned_cuts(&attachment, &stroke, "box");
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    assert!(
+        warnings[0].message.contains("attachment[0] pins it"),
+        "{}",
+        warnings[0].message
+    );
+}
+
+/// A rim is told from its teeth alone where most of the cut is free.
+#[test]
+fn a_rim_of_pinned_particles_is_counted() {
+    let fixed = format!("fixed = [{BELOW}]");
+    let stroke = plane(1, [0.0, 0.0, -0.2], [0.0, 0.05, 1.0]);
+    let warnings = pinned_cuts(&fixed, &stroke, "sphere");
+    assert_eq!(warnings.len(), 1, "{warnings:?}");
+    let message = &warnings[0].message;
+    assert!(
+        message.contains("stays pinned by") && message.contains("particles along the cut"),
+        "{message}"
+    );
+}
+
+/// Cuts that free a part, or run down into a pinned base, are no reason for a warning; nor are soft attachments and grabs.
+#[test]
+fn cuts_that_can_open_are_not_named() {
+    let fixed = format!("fixed = [{BELOW}]");
+    let soft = format!(
+        "[[attachment]]\nregions = [{BELOW}]\ncompliance = 1e-3\nframes = [0, 9]\npath = [[0, 0, 0], [0, 0, 0.1]]\n"
+    );
+    let above = plane(1, [0.0, 0.0, -0.1], [0.0, 0.0, 1.0]);
+    let inside = plane(1, [0.0, 0.0, -0.25], [0.0, 0.0, 1.0]);
+    let down = plane(1, [0.02, 0.0, 0.0], [1.0, 0.0, 0.0]);
+    let slit = sweep(
+        [1, 3],
+        [[0.02, -1.0, 0.7], [0.02, 1.0, 0.7]],
+        [0.0, 0.0, -1.0],
+    );
+    // Only the lowest layer is pinned, all of it next to the cut, but the part above comes off.
+    let layer = "fixed = [{ half_space = { point = [0, 0, -0.49], normal = [0, 0, -1] } }]";
+    let near = plane(1, [0.0, 0.0, -0.45], [0.0, 0.0, 1.0]);
+    for (pinned, stroke) in [
+        (fixed.as_str(), &above),
+        (&fixed, &down),
+        (&fixed, &slit),
+        (&soft, &inside),
+        (layer, &near),
+        ("", &inside),
+    ] {
+        let warnings = pinned_cuts(pinned, stroke, "box");
+        assert!(warnings.is_empty(), "{pinned} {stroke}: {warnings:?}");
+    }
 }
 
 /// Planes that cross at irregular angles leave parts below half a mean tet. By default those beside a larger part stay
@@ -269,4 +470,46 @@ fn crumbs_stay_with_larger_parts_unless_the_scene_turns_that_off() {
         "{small} of {pieces}, {all_small} of {all}"
     );
     assert!((volume / same - 1.0).abs() < 1e-12);
+}
+
+/// Three planes that cross at many offsets, with the largest snap distance, on every kind of generated body: a single tet
+/// comes off by default only from a part of fewer than four mean tets, which is too small for crumbs to stay with. Without
+/// the rule for crumbs single tets come off large parts.
+#[test]
+fn planes_at_the_largest_snap_distance_leave_no_single_tets() {
+    let mut loose = 0;
+    for shape in ["box", "sphere", "liver", "torus", "beam"] {
+        for i in 0..20_u32 {
+            let along = -0.48 + 0.048 * f64::from(i) + 1e-3;
+            let tilt = 0.3 * f64::from(i % 3);
+            let normals = [
+                [1.0, tilt, 0.2 - tilt],
+                [tilt, 1.0, 0.15],
+                [0.1, -tilt, 1.0],
+            ];
+            let point = [0.5 * along, 0.3 * along, 0.2 * along];
+            let strokes = normals.map(|normal| plane(0, point, normal) + "snap = 0.25\n");
+            let run = |cutting: &str| {
+                let body = body(shape, 1500, [0.0; 3]);
+                let text = format!("{cutting}\n{body}{}", strokes.concat());
+                let mut simulation = simulation(&Scene::from_toml(&text).unwrap());
+                let mean = simulation.mesh().total_volume() / simulation.mesh().tets.len() as f64;
+                simulation.step().unwrap();
+                let pieces = simulation.pieces();
+                let parent = |single: &PieceReport| {
+                    let parent = single
+                        .parent
+                        .and_then(|id| pieces.iter().find(|piece| piece.id == id));
+                    single.volume + parent.map_or(0.0, |parent| parent.volume)
+                };
+                let singles = pieces.iter().filter(|piece| piece.tets == 1);
+                singles
+                    .filter(|single| parent(single) >= 4.0 * mean)
+                    .count()
+            };
+            assert_eq!(run(""), 0, "{shape} cut at {along}");
+            loose += run("[cutting]\ncrumbs = 0.0");
+        }
+    }
+    assert!(loose > 0, "no plane leaves a single tet to begin with");
 }

@@ -96,6 +96,20 @@ impl<R: Float> Attachments<R> {
             .binary_search_by_key(&particle, |a| a.particle as usize)
     }
 
+    /// Number of handles.
+    pub(crate) fn handle_count(&self) -> usize {
+        self.handles.len()
+    }
+
+    /// Of each particle on a spring: its handle, mass times the motion that the spring gave it in the substep, and
+    /// where the spring is fastened, relative to the origin.
+    pub(crate) fn pulls(&self) -> impl Iterator<Item = (u32, DVec3, DVec3)> + '_ {
+        self.soft().map(|attachment| {
+            let [impulse, target] = [attachment.multiplier, attachment.target].map(R::to_dvec3);
+            (attachment.handle, impulse, target)
+        })
+    }
+
     pub(crate) fn get(&self, particle: usize) -> Option<&Attachment<R>> {
         self.find(particle).ok().map(|i| &self.list[i])
     }

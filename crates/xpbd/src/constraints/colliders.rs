@@ -18,6 +18,7 @@ use rayon::prelude::*;
 use super::ConstraintKind;
 use crate::collider::{Nearest, Solid};
 use crate::float::{finite, load, store, weight};
+use crate::forces::Force;
 use crate::particles::{PARALLEL_PARTICLES, Particles};
 use crate::substep::Substep;
 use crate::{Collider, Float, StepSettings};
@@ -34,12 +35,17 @@ const ROUNDS: usize = 32;
 pub(crate) struct Colliders<R: Float> {
     #[cfg_attr(feature = "serde", serde(skip))]
     pub(crate) obstacles: Vec<Obstacle<R>>,
+    /// Of each obstacle, while forces are measured: the sum of mass times motion that particles gave it in the substep,
+    /// and its moment.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pushes: Vec<Force>,
 }
 
 impl<R: Float> Default for Colliders<R> {
     fn default() -> Self {
         Self {
             obstacles: Vec::new(),
+            pushes: Vec::new(),
         }
     }
 }
@@ -64,6 +70,46 @@ impl<R: Float> Colliders<R> {
         self.obstacles.iter().any(|o| o.touched_at(x).is_some())
     }
 
+    /// [`Colliders::project`], which adds to the sums of all obstacles what particles push them by. The sums have a fixed
+    /// order.
+    fn project_measured(&mut self, particles: &Particles<R>) {
+        let obstacles = &*self.obstacles;
+        let chunks = particles.cells.par_chunks(PARALLEL_PARTICLES).enumerate();
+        let sums = chunks.map(|(chunk, cells)| {
+            let mut pushes = vec![Force::default(); obstacles.len()];
+            for (i, cell) in cells.iter().enumerate() {
+                let p = chunk * PARALLEL_PARTICLES + i;
+                if weight::<R>(cell) <= R::ZERO {
+                    continue;
+                }
+                let mass = particles.masses[p];
+                let note = |obstacle: usize, from: R::Vector, to: R::Vector| {
+                    let at = particles.origin + R::to_dvec3(to);
+                    pushes[obstacle].add(R::to_dvec3(from - to) * mass, at);
+                };
+                let x = load::<R>(cell);
+                if let Some(x) = outside_noting(obstacles, x, particles.previous[p], note) {
+                    store::<R>(cell, x);
+                }
+            }
+            pushes
+        });
+        for pushes in sums.collect::<Vec<_>>() {
+            for (sum, push) in self.pushes.iter_mut().zip(pushes) {
+                sum.force += push.force;
+                sum.torque += push.torque;
+            }
+        }
+    }
+
+    /// Adds the impulses of the substep to those of a frame.
+    pub(crate) fn take_pushes(&mut self, impulses: &mut [Force], per_time: f64) {
+        for (sum, push) in impulses.iter_mut().zip(self.pushes.drain(..)) {
+            sum.force += push.force * per_time;
+            sum.torque += push.torque * per_time;
+        }
+    }
+
     /// Puts the particles inside of colliders on their surface.
     pub(crate) fn project(&self, particles: &Particles<R>) {
         if self.obstacles.is_empty() {
@@ -86,11 +132,19 @@ impl<R: Float> Colliders<R> {
 impl<R: Float> ConstraintKind<R> for Colliders<R> {
     fn begin(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
         self.place(substep.settings, substep.elapsed, particles.origin);
+        self.pushes.clear();
+        if particles.keeps_refused() {
+            self.pushes.resize(self.obstacles.len(), Force::default());
+        }
         0
     }
 
     fn solve(&mut self, particles: &Particles<R>, _substep: &Substep<'_, R>) {
-        self.project(particles);
+        if self.pushes.is_empty() {
+            self.project(particles);
+        } else {
+            self.project_measured(particles);
+        }
     }
 
     fn bytes(&self) -> usize {
@@ -133,9 +187,22 @@ impl<R: Float> Obstacle<R> {
     /// What is left of a force in N on a particle that the collider bears: nothing of what presses the particle into
     /// it, nor of what friction then holds.
     pub(crate) fn left_of(&self, force: DVec3, x: R::Vector) -> DVec3 {
-        let Some(normal) = self.touched_at(x).map(R::to_dvec3) else {
-            return force;
-        };
+        match self.touched_at(x) {
+            Some(normal) => self.left_along(force, R::to_dvec3(normal)),
+            None => force,
+        }
+    }
+
+    /// What a collider bears by its law of a force in N that presses a particle into it, at most `gap` m outside of its
+    /// surface; `None` if the particle is farther away or the force pulls it off.
+    pub(crate) fn borne(&self, force: DVec3, x: R::Vector, gap: f64) -> Option<DVec3> {
+        let nearest = self.solid.nearest(x);
+        let normal = R::to_dvec3(nearest.normal);
+        let presses = nearest.distance.to_f64() <= gap && normal.dot(force) < 0.0;
+        presses.then(|| force - self.left_along(force, normal))
+    }
+
+    fn left_along(&self, force: DVec3, normal: DVec3) -> DVec3 {
         let pressure = -normal.dot(force);
         if pressure < 0.0 {
             return force;
@@ -224,14 +291,27 @@ impl Obstacle<f32> {
 #[inline]
 pub(crate) fn outside<R: Float>(
     obstacles: &[Obstacle<R>],
+    x: R::Vector,
+    previous: R::Vector,
+) -> Option<R::Vector> {
+    outside_noting(obstacles, x, previous, |_, _, _| {})
+}
+
+/// [`outside`], which tells which obstacle puts the particle from where to where.
+#[inline]
+fn outside_noting<R: Float>(
+    obstacles: &[Obstacle<R>],
     mut x: R::Vector,
     previous: R::Vector,
+    mut note: impl FnMut(usize, R::Vector, R::Vector),
 ) -> Option<R::Vector> {
     // Obstacles in a row that the particle is not inside of.
     let (mut clear, mut moved) = (0, false);
-    for obstacle in obstacles.iter().cycle().take(ROUNDS * obstacles.len()) {
+    let turns = ROUNDS * obstacles.len();
+    for (number, obstacle) in obstacles.iter().enumerate().cycle().take(turns) {
         clear += 1;
         if let Some(out) = obstacle.push_out(x, previous) {
+            note(number, x, out);
             (x, clear, moved) = (out, 1, true);
         }
         if clear == obstacles.len() {

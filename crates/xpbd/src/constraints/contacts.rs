@@ -589,6 +589,11 @@ impl<R: Float> Contacts<R> {
         for k in 0..K {
             store::<R>(cells[k], x[k] + impulse * (weights[k] * gap.shares[k]));
         }
+        if particles.keeps_refused() {
+            for (&particle, &share) in numbers.iter().zip(&gap.shares) {
+                particles.refuse(particle, impulse * share);
+            }
+        }
         if let Some(multiplier) = multiplier {
             let [x, y, z] = R::components(friction);
             R::write(multiplier, [x, y, z, pressure]);

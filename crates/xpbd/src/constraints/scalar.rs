@@ -187,6 +187,11 @@ impl<R: Float, C: ScalarConstraint<R, K>, const K: usize> ScalarConstraints<R, C
         if let Some(multiplier) = multiplier {
             (before + change).store(multiplier);
         }
+        if particles.keeps_refused() {
+            for k in 0..K {
+                particles.refuse(numbers[k], gradients[k] * change);
+            }
+        }
     }
 }
 

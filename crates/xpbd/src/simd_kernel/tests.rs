@@ -97,6 +97,7 @@ impl<R: Float> Case<R> {
             velocities: &[],
             multipliers,
             corrections: &[],
+            refused: &[],
             iterated,
             factors: self.factors,
         };
@@ -123,6 +124,7 @@ impl<R: Float> Case<R> {
             velocities: &velocities,
             multipliers: &[],
             corrections: &[],
+            refused: &[],
             iterated: false,
             factors: self.factors,
         };

@@ -537,6 +537,9 @@ impl<R: Float> Solver<R> {
         if self.constraints.contacts.is_declared() {
             settings.method.check_contacts()?;
         }
+        if self.stepper.meter.is_some() {
+            settings.method.check_forces()?;
+        }
         self.update_layout(schedule);
         let jittered = if part.start == 0 { self.prepare() } else { 0 };
         let Self {

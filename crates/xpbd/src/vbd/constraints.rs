@@ -493,10 +493,20 @@ impl<R: Float> ConstraintTerms<R> {
                 Some(volume) => spring.pull(&volume_of(solver, volume).to_f64(), position, out),
             }
         }
-        for anchor in &self.anchors {
-            let away = R::to_dvec3(anchor.position) - position(anchor.particle);
-            out[anchor.particle as usize] += away * anchor.stiffness.to_f64();
+        for (particle, force) in self.anchor_forces(position) {
+            out[particle as usize] += force;
         }
+    }
+
+    /// The particles on springs of handles and the forces of these in N.
+    pub(super) fn anchor_forces(
+        &self,
+        position: &impl Fn(u32) -> DVec3,
+    ) -> impl Iterator<Item = (u32, DVec3)> {
+        self.anchors.iter().map(move |anchor| {
+            let away = R::to_dvec3(anchor.position) - position(anchor.particle);
+            (anchor.particle, away * anchor.stiffness.to_f64())
+        })
     }
 
     /// The step of the particle at a position of the order, now at `x`, that lowers the energy of its star. `tets` is what

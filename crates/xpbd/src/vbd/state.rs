@@ -9,10 +9,13 @@ use rayon::prelude::*;
 use super::ImplicitStep;
 use crate::Float;
 use crate::float::weight;
+use crate::forces::ForceMeter;
 use crate::neo_hookean::TetConstraint;
 
 /// Tets summed as one part: the same parts for any number of threads.
 const PARALLEL_TETS: usize = 2048;
+/// How far from a collider a particle may press it, as a part of the size of a tet.
+const TOUCHING: f64 = 1e-3;
 
 impl<R: Float> ImplicitStep<'_, R> {
     /// Returns the incremental potential in J: inertia, tets, damping and constraints. Its elastic part is 0 at rest.
@@ -156,6 +159,71 @@ impl<R: Float> ImplicitStep<'_, R> {
 
     fn forces_at(&self, position: &impl Fn(usize) -> DVec3, out: &mut Vec<DVec3>) {
         let solver = &*self.solver;
+        self.inner_forces(position, out);
+        let per_time_squared = self.time.to_f64().powi(-2);
+        for (p, force) in out.iter_mut().enumerate() {
+            let x = position(p);
+            *force += (self.free_position(p) - x) * (per_time_squared * solver.mass(p));
+            if weight::<R>(&solver.particles.cells[p]) <= R::ZERO {
+                *force = DVec3::ZERO;
+            }
+            for obstacle in &solver.constraints.colliders.obstacles {
+                *force = obstacle.left_of(*force, R::from_dvec3(x));
+            }
+        }
+    }
+
+    /// Adds the forces of the substep on what holds the bodies to those of a frame: of springs, of colliders, which bear
+    /// what is left over at a particle that touches them, and of the constraints on held particles. O(tets), on one
+    /// thread.
+    pub(super) fn measure(&self, meter: &mut ForceMeter) {
+        let solver = &*self.solver;
+        let particles = &solver.particles;
+        let time = self.settings.substep_time();
+        let mut forces = Vec::new();
+        self.inner_forces(&|p| particles.local(p), &mut forces);
+        let local = |p: u32| particles.local(p as usize);
+        for (p, force) in self.stars.data.constraints.anchor_forces(&local) {
+            let p = p as usize;
+            let Some(attachment) = solver.constraints.attachments.get(p) else {
+                continue;
+            };
+            if particles.is_free(p) {
+                let at = particles.origin + R::to_dvec3(attachment.target);
+                meter.add_handle(attachment.handle, force * -time, at);
+            } else {
+                forces[p] -= force;
+            }
+        }
+        meter.add_forces(particles, &forces, time);
+        let per_time_squared = self.time.to_f64().powi(-2);
+        // On a curved collider a particle ends next to the surface. Nothing is left over where it does not press.
+        let gap = TOUCHING * self.stars.data.size;
+        for (p, &inner) in forces.iter().enumerate() {
+            if solver.constraints.colliders.obstacles.is_empty() || !particles.is_free(p) {
+                continue;
+            }
+            let x = particles.local(p);
+            let lag = self.free_position(p) - x;
+            let mut force = inner + lag * (per_time_squared * solver.mass(p));
+            // Sweeps reach the law of friction only about, so what that leaves is borne too, by the last one.
+            let mut last = None;
+            for (number, obstacle) in solver.constraints.colliders.obstacles.iter().enumerate() {
+                if let Some(borne) = obstacle.borne(force, R::from_dvec3(x), gap) {
+                    meter.add_collider(number, borne * time, particles.origin + x);
+                    force -= borne;
+                    last = Some(number);
+                }
+            }
+            if let Some(number) = last {
+                meter.add_collider(number, force * time, particles.origin + x);
+            }
+        }
+    }
+
+    /// Writes the forces of tets, damping and constraints in N to `out`.
+    fn inner_forces(&self, position: &impl Fn(usize) -> DVec3, out: &mut Vec<DVec3>) {
+        let solver = &*self.solver;
         out.clear();
         out.resize(solver.particle_count(), DVec3::ZERO);
         for tet in &solver.tets.list {
@@ -177,17 +245,6 @@ impl<R: Float> ImplicitStep<'_, R> {
         let constraints = &self.stars.data.constraints;
         if !constraints.is_empty() {
             constraints.add_forces(solver, &|p| position(p as usize), out);
-        }
-        let per_time_squared = self.time.to_f64().powi(-2);
-        for (p, force) in out.iter_mut().enumerate() {
-            let x = position(p);
-            *force += (self.free_position(p) - x) * (per_time_squared * solver.mass(p));
-            if weight::<R>(&solver.particles.cells[p]) <= R::ZERO {
-                *force = DVec3::ZERO;
-            }
-            for obstacle in &solver.constraints.colliders.obstacles {
-                *force = obstacle.left_of(*force, R::from_dvec3(x));
-            }
         }
     }
 }

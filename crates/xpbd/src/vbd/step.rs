@@ -50,6 +50,13 @@ impl<R: Float> Solver<R> {
             return Err(XpbdError::ContactMethod { method: "vbd" });
         }
         self.recenter();
+        let mut meter = self.stepper.meter.take();
+        if let Some(meter) = &mut meter {
+            let (attachments, colliders) =
+                (&self.constraints.attachments, settings.step.colliders.len());
+            let frame_time = settings.step.time_step;
+            meter.start(&self.particles, attachments, colliders, frame_time);
+        }
         let mut report = VbdReport::default();
         let (count, time) = (settings.step.substeps, settings.step.substep_time());
         for number in 1..=count {
@@ -65,15 +72,26 @@ impl<R: Float> Solver<R> {
                     count: count * parts,
                     is_startup: startup.is_some(),
                 };
+                if let Some(meter) = &mut meter {
+                    meter.begin(&self.particles);
+                }
                 let mut step = ImplicitStep::predicted(self, stars, settings, penalty, substep);
                 step.run(settings, &mut report, &mut iterate);
                 report.error = match (report.error, step.error) {
                     (Some(a), Some(b)) => Some(a.max(b)),
                     (a, b) => a.or(b),
                 };
+                let own_time = step.settings.substep_time();
+                if let Some(meter) = &mut meter {
+                    step.measure(meter);
+                }
                 report.repaired += step.finish().repaired;
+                if let Some(meter) = &mut meter {
+                    meter.end(&self.particles, settings.step.gravity, own_time);
+                }
             }
         }
+        self.stepper.meter = meter;
         Ok(report)
     }
 }

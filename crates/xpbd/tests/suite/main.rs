@@ -22,6 +22,7 @@ mod edits;
 mod energy;
 mod extremes;
 mod finite_elements;
+mod forces;
 mod ground;
 mod guards;
 mod kappa;
