@@ -19,7 +19,9 @@ pub use attachments::AttachmentData;
 pub(crate) use attachments::Attachments;
 pub(crate) use colliders::{Colliders, Obstacle, outside};
 pub(crate) use contacts::Contacts;
-pub use contacts::{ContactLaw, ContactState, FaceContact, PairContact};
+pub use contacts::{
+    ContactData, ContactFactors, ContactLaw, ContactRound, ContactState, FaceContact, PairContact,
+};
 pub(crate) use distances::{Distance, Distances};
 pub use distances::{DistanceConstraint, DistanceData};
 pub(crate) use scalar::ScalarConstraint;
