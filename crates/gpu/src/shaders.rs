@@ -4,8 +4,8 @@ use std::mem::offset_of;
 
 use crate::coloring::{Round, SEARCH_WORDS, VivaceSettings, WAIT_WORDS, WlcWork, Work};
 use crate::solver::{
-    Attachment, DispatchRange, IterationUniform, ParticlePatch, ParticleSums, Settings, TetPatch,
-    TetSums, Units,
+    Attachment, ContactUniform, DispatchRange, IterationUniform, ParticlePatch, ParticleSums,
+    Settings, TetPatch, TetSums, Units,
 };
 use crate::{coloring, solver};
 
@@ -123,6 +123,12 @@ pub fn shared_structs() -> Vec<SharedStruct> {
             substep,
             iteration,
             weight,
+            unused
+        }),
+        shared!(ContactUniform {
+            friction,
+            kept,
+            margin,
             unused
         }),
         shared!(Attachment {

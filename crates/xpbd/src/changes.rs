@@ -19,6 +19,8 @@ pub struct Changes {
     pub distances: bool,
     /// Whether the volume constraints were replaced.
     pub volumes: bool,
+    /// Whether the contacts were replaced or removed.
+    pub contacts: bool,
 }
 
 impl Changes {
@@ -31,6 +33,7 @@ impl Changes {
             attachments: true,
             distances: true,
             volumes: true,
+            contacts: true,
             ..Self::default()
         }
     }

@@ -72,8 +72,9 @@ mod vbd;
 pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};
 pub use constraints::{
-    AttachmentData, ContactLaw, ContactState, DistanceConstraint, DistanceData, FaceContact,
-    PairContact, SolidBlade, VolumeConstraint, VolumeData,
+    AttachmentData, ContactData, ContactFactors, ContactLaw, ContactRound, ContactState,
+    DistanceConstraint, DistanceData, FaceContact, PairContact, SolidBlade, VolumeConstraint,
+    VolumeData,
 };
 pub use device::TetData;
 pub use error::XpbdError;

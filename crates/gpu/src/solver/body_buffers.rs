@@ -9,6 +9,7 @@ use incise_xpbd::{Changes, Solver};
 
 use super::attachments::Attachments;
 use super::colors::Colors;
+use super::contacts::Contacts;
 use super::gpu_types::{DispatchRange, NUMBERS, ParticlePatch, TetPatch};
 use super::kernels::{Kernels, Kind, PATCH_PARTICLES, PATCH_TETS, Variant};
 use super::layout::{ClusterMapping, Layout, THREADS};
@@ -44,6 +45,8 @@ pub(crate) struct BodyBuffers {
     /// Distance constraints, if there are any.
     pub(crate) distances: Option<ScalarConstraints>,
     pub(crate) volumes: Option<ScalarConstraints>,
+    /// Contacts, if they are declared.
+    pub(crate) contacts: Option<Contacts>,
     tet_patches: Array<TetPatch>,
     particle_patches: Array<ParticlePatch>,
     range: Array<DispatchRange>,
@@ -66,6 +69,7 @@ impl BodyBuffers {
             attachments: None,
             distances: None,
             volumes: None,
+            contacts: None,
             tet_patches: Array::zeros(gpu, "patches of tets", 0)?,
             particle_patches: Array::zeros(gpu, "patches of particles", 0)?,
             range: Array::with_usage(gpu, "size of a patch", 1, wgpu::BufferUsages::UNIFORM)?,
@@ -88,6 +92,9 @@ impl BodyBuffers {
         }
         if changes.volumes {
             ScalarConstraints::sync(&mut self.volumes, gpu, solver, Kind::Volume)?;
+        }
+        if changes.contacts {
+            Contacts::sync(&mut self.contacts, gpu, solver)?;
         }
         let patch = self.layout.sync(schedule, solver, changes)?;
         if patch.regrouped {
@@ -216,7 +223,8 @@ impl BodyBuffers {
         .sum();
         let scalars = self.distances.iter().chain(&self.volumes);
         let handles = self.attachments.as_ref().map_or(0, Attachments::bytes);
-        arrays + handles + scalars.map(ScalarConstraints::bytes).sum::<u64>()
+        let contacts = self.contacts.as_ref().map_or(0, Contacts::bytes);
+        arrays + handles + contacts + scalars.map(ScalarConstraints::bytes).sum::<u64>()
     }
 }
 

@@ -40,6 +40,9 @@ impl GpuSolver {
             ranges: body.colors.ranges.array.read(gpu)?,
         };
         self.check_particles(&copy)?;
+        if let Some(contacts) = &body.contacts {
+            contacts.check(gpu, &self.host)?;
+        }
         for color in 0..schedule.color_count() {
             for &cluster in schedule.clusters(color) {
                 for &tet in schedule.constraints(cluster) {
@@ -181,7 +184,7 @@ fn steps(tile: usize, room: usize, copy: &Copy) -> (usize, &[u32]) {
     (copy.tiles[header] as usize, ends)
 }
 
-fn differs(what: &str) -> Result<(), GpuError> {
+pub(crate) fn differs(what: &str) -> Result<(), GpuError> {
     Err(GpuError::Inconsistent {
         what: what.to_owned(),
     })

@@ -140,7 +140,7 @@ pub(crate) struct SyncedArray {
 }
 
 impl SyncedArray {
-    fn new(
+    pub(crate) fn new(
         gpu: &GpuContext,
         what: &'static str,
         usage: wgpu::BufferUsages,
@@ -151,14 +151,22 @@ impl SyncedArray {
         })
     }
 
-    fn set(&mut self, gpu: &GpuContext, values: Vec<u32>) -> Result<(), GpuError> {
+    /// Replaces all values; pieces in a row that differ are sent together.
+    pub(crate) fn set(&mut self, gpu: &GpuContext, values: Vec<u32>) -> Result<(), GpuError> {
         let known = self.host.len();
         self.array.resize(gpu, values.len())?;
+        // The start of the pieces that differ and are not yet sent.
+        let mut from = None;
         for start in (0..values.len()).step_by(PIECE) {
             let end = (start + PIECE).min(values.len());
             if end > known || self.host[start..end] != values[start..end] {
-                self.array.write(gpu, start, &values[start..end]);
+                from.get_or_insert(start);
+            } else if let Some(from) = from.take() {
+                self.array.write(gpu, from, &values[from..start]);
             }
+        }
+        if let Some(from) = from {
+            self.array.write(gpu, from, &values[from..]);
         }
         self.host = values;
         Ok(())

@@ -4,12 +4,15 @@
 //! not interrupted. Twin: `Solver::substep` of incise-xpbd. Cost: well below a microsecond to
 //! record a dispatch.
 
+use std::ops::Range;
+
 use incise_xpbd::{Solver, StepSettings, TetSolve};
 use wgpu::{Buffer, BufferUsages, SubmissionIndex};
 
 use super::attachments::{AttachmentKernels, Attachments};
 use super::body_buffers::BodyBuffers;
 use super::colliders::Colliders;
+use super::contacts::ContactKernels;
 use super::gpu_types::Settings;
 use super::iterations::{self, IterationUniforms};
 use super::jacobi::{Jacobi, JacobiKernels};
@@ -66,16 +69,21 @@ impl Frame {
         })
     }
 
-    /// Records and submits a step; returns the index to wait for.
+    /// Records and submits some substeps of a frame; returns the index to wait for.
     pub(crate) fn record(
         &mut self,
         scene: Scene<'_>,
         settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> Result<SubmissionIndex, GpuError> {
         let Scene { gpu, host, .. } = scene;
         let keeps = keep || settings.iterations > 1;
         self.prepare(gpu, scene.body, host, settings, keeps)?;
+        let begins = match &mut scene.body.contacts {
+            Some(contacts) => contacts.prepare(gpu, host, settings, part.start)?,
+            None => false,
+        };
         if keep {
             self.predicted.resize(gpu, host.particle_count())?;
         }
@@ -88,11 +96,15 @@ impl Frame {
             scene.repaired,
             settings,
             keeps,
+            begins,
         )?;
         let body = &*scene.body;
         let mut track = Track::new(gpu, self.clock.as_mut());
         let particles = host.particle_count().div_ceil(THREADS);
-        for substep in 0..settings.substeps {
+        if let Some(contacts) = &passes.contacts {
+            contacts.begin_frame(track.at(Other));
+        }
+        for substep in part {
             let start = iterations::offset(settings, substep, 0);
             passes.predict.run(track.at(Predict), &[], particles);
             if let Some(handles) = &passes.handles {
@@ -104,6 +116,9 @@ impl Frame {
             }
             for scalars in &passes.scalars {
                 scalars.begin(track.at(Other));
+            }
+            if let Some(contacts) = &passes.contacts {
+                contacts.begin_substep(track.at(Other));
             }
             if keep && substep + 1 == settings.substeps {
                 let bytes = (host.particle_count() * size_of::<[f32; 4]>()) as u64;
@@ -123,6 +138,9 @@ impl Frame {
                 }
                 for scalars in &passes.scalars {
                     scalars.solve(track.at(Other));
+                }
+                if let Some(contacts) = &passes.contacts {
+                    contacts.solve(track.at(Other));
                 }
                 if let Some(project) = &passes.project {
                     project.run(track.at(Other), &[uniform], particles);
@@ -286,6 +304,7 @@ struct StepContext<'a> {
     handles: Option<AttachmentKernels>,
     /// Kernels of distances, then of volumes.
     scalars: Vec<ScalarKernels<'a>>,
+    contacts: Option<ContactKernels<'a>>,
 }
 
 impl Frame {
@@ -302,6 +321,7 @@ impl Frame {
         repaired: &Array<u32>,
         settings: &StepSettings,
         keeps: bool,
+        begins: bool,
     ) -> Result<StepContext<'a>, GpuError> {
         let constants = self.settings.buffer();
         let (particles, previous) = (body.particles.buffer(), body.previous.buffer());
@@ -357,6 +377,13 @@ impl Frame {
             let buffers = [constants, particles, previous];
             scalars.push(constraints.bind(gpu, kernels, buffers, several)?);
         }
+        let contacts = match &body.contacts {
+            Some(contacts) => {
+                let buffers = [constants, particles, previous];
+                contacts.bind(gpu, kernels, buffers, several, begins)?
+            }
+            None => None,
+        };
         let mut bind =
             |source, variant, buffers: &[&Buffer]| kernels.bind(gpu, source, variant, buffers);
         Ok(StepContext {
@@ -402,6 +429,7 @@ impl Frame {
                 _ => None,
             },
             scalars,
+            contacts,
         })
     }
 }

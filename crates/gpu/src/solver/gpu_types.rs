@@ -44,6 +44,16 @@ pub(crate) struct IterationUniform {
     pub(crate) unused: u32,
 }
 
+/// `ContactUniform` in `contact.wgsl`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ContactUniform {
+    pub(crate) friction: f32,
+    pub(crate) kept: f32,
+    pub(crate) margin: f32,
+    pub(crate) unused: f32,
+}
+
 /// `Attachment` in `attachments.wgsl`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[repr(C)]

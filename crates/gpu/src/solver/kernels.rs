@@ -494,6 +494,46 @@ const SOLVE_VOLUMES_TAIL: Source = Source {
     flags: &[Flag::Damped, Flag::Keeps],
 };
 
+/// Bindings of the kernels that solve contacts.
+const CONTACTS: &[BindingKind] = &[
+    BindingKind::Uniform,
+    BindingKind::DynamicUniform(DISPATCH_RANGE),
+    BindingKind::Write,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Read,
+    BindingKind::Uniform,
+    BindingKind::Write,
+    BindingKind::Write,
+    BindingKind::Read,
+];
+
+pub(crate) const SOLVE_CONTACTS: Source = Source {
+    name: "solve_contacts",
+    parts: text!(
+        "common",
+        "settings",
+        "direction",
+        "contact",
+        "solve_threads"
+    ),
+    uses: CONTACTS,
+    flags: &[Flag::Keeps],
+};
+
+pub(crate) const SOLVE_CONTACTS_TAIL: Source = Source {
+    name: "solve_contacts_tail",
+    parts: text!(
+        "common",
+        "settings",
+        "direction",
+        "contact",
+        "solve_threads_tail"
+    ),
+    uses: CONTACTS,
+    flags: &[Flag::Keeps],
+};
+
 /// The shaders of the solver.
 pub(crate) const SOURCES: &[Source] = &[
     PREDICT,
@@ -517,6 +557,8 @@ pub(crate) const SOURCES: &[Source] = &[
     SOLVE_DISTANCES_TAIL,
     SOLVE_VOLUMES,
     SOLVE_VOLUMES_TAIL,
+    SOLVE_CONTACTS,
+    SOLVE_CONTACTS_TAIL,
     APPLY_CORRECTIONS,
     EXTRAPOLATE_MULTIPLIERS,
     MEASURE_TETS,

@@ -2,8 +2,8 @@
 //!
 //! Tets, masses, materials, attachments and colliders are edited in a [`Solver`] on the host; the device has a copy of
 //! them and the state. A step is recorded as one pass and submitted once: predict, move rigid attachments to their
-//! handles, solve color by color, solve compliant attachments, distances and volumes, project to colliders, update and
-//! damp velocities, substep by substep. Features that a scene does not use take no memory and no dispatch. A step reads
+//! handles, solve color by color, solve compliant attachments, distances, volumes and contacts, project to colliders, update
+//! and damp velocities, substep by substep. Features that a scene does not use take no memory and no dispatch. A step reads
 //! nothing back: results come from calls that wait for the device ([`GpuSolver::host`], [`GpuSolver::measure`]).
 //!
 //! Twin: `Solver::step` of incise-xpbd, with the same schedule and [`ClusterMapping::Threads`]. Positions agree up to
@@ -16,6 +16,7 @@ mod body_buffers;
 mod check;
 mod colliders;
 mod colors;
+mod contacts;
 mod frame;
 mod gpu_types;
 mod iterations;
@@ -32,6 +33,7 @@ mod stages;
 mod tile;
 
 use std::collections::VecDeque;
+use std::ops::Range;
 use std::sync::Arc;
 
 use incise_graph::Schedule;
@@ -44,8 +46,8 @@ pub use measure::Measures;
 pub use stages::StageTimes;
 
 pub(crate) use gpu_types::{
-    Attachment, DispatchRange, IterationUniform, ParticlePatch, ParticleSums, Settings, TetPatch,
-    TetSums, Units,
+    Attachment, ContactUniform, DispatchRange, IterationUniform, ParticlePatch, ParticleSums,
+    Settings, TetPatch, TetSums, Units,
 };
 
 use crate::array::Array;
@@ -158,8 +160,8 @@ impl GpuSolver {
     ///
     /// # Errors
     /// If the settings do not pass [`StepSettings::check`]; if they ask for Jacobi or Chebyshev iterations in
-    /// [`ClusterMapping::Workgroups`]; if a cluster is larger than the mapping allows; if the device is lost or out of
-    /// memory.
+    /// [`ClusterMapping::Workgroups`] or with contacts; if a cluster is larger than the mapping allows; if the device is
+    /// lost or out of memory.
     ///
     /// # Panics
     /// If the schedule names a tet that does not exist.
@@ -167,7 +169,7 @@ impl GpuSolver {
     /// # Determinism
     /// Bit-identical on the same device and driver.
     pub fn step(&mut self, schedule: &Schedule, settings: &StepSettings) -> Result<(), GpuError> {
-        self.advance(schedule, settings, false)
+        self.advance(schedule, settings, 0..settings.substeps, false)
     }
 
     /// Advances by one frame like [`GpuSolver::step`] and keeps the data that [`Solver::residuals`] needs of the last
@@ -183,23 +185,44 @@ impl GpuSolver {
         schedule: &Schedule,
         settings: &StepSettings,
     ) -> Result<(), GpuError> {
-        self.advance(schedule, settings, true)
+        self.advance(schedule, settings, 0..settings.substeps, true)
+    }
+
+    /// Advances by some of the substeps of a frame, numbered from 0, like [`Solver::step_part`], so that contacts can be
+    /// set again within the frame. All parts of a frame in their order are, to the bit, that frame, as long as nothing
+    /// changes in between. With `keep_residuals` the part that ends the frame keeps what [`Solver::residuals`] needs.
+    ///
+    /// # Errors
+    /// Those of [`GpuSolver::step`], and if the part ends before it begins or beyond the frame.
+    ///
+    /// # Panics
+    /// If the schedule names a tet that does not exist.
+    pub fn step_part(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        part: Range<u32>,
+        keep_residuals: bool,
+    ) -> Result<(), GpuError> {
+        self.advance(schedule, settings, part, keep_residuals)
     }
 
     fn advance(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> Result<(), GpuError> {
         let _span = tracing::debug_span!("gpu::step").entered();
-        settings.check()?;
+        self.host.check_step(settings, &part)?;
+        let ends = part.end == settings.substeps;
         // A caller that is faster than the device waits here; otherwise memory runs out.
         while self.in_flight.len() >= FRAMES_IN_FLIGHT {
             let oldest = self.in_flight.pop_front();
             oldest.map_or(Ok(()), |oldest| self.gpu.wait_for(oldest))?;
         }
-        self.send(schedule)?;
+        self.send_changes(schedule, part.start == 0)?;
         let Self {
             gpu,
             host,
@@ -216,10 +239,12 @@ impl GpuSolver {
             host,
             repaired,
         };
-        let submission = frame.record(scene, settings, keep)?;
+        let submission = frame.record(scene, settings, part, keep && ends)?;
         self.in_flight.push_back(submission);
         self.ahead = true;
-        self.host.end_frame();
+        if ends {
+            self.host.end_frame();
+        }
         Ok(())
     }
 
@@ -232,7 +257,12 @@ impl GpuSolver {
     /// # Panics
     /// If the schedule names a tet that does not exist.
     pub fn send(&mut self, schedule: &Schedule) -> Result<(), GpuError> {
-        if !self.ahead {
+        self.send_changes(schedule, true)
+    }
+
+    /// `begins` says that a frame does, which may move the origin.
+    fn send_changes(&mut self, schedule: &Schedule, begins: bool) -> Result<(), GpuError> {
+        if begins && !self.ahead {
             self.host.prepare_state();
         }
         let changes = self.host.take_changes();
@@ -312,7 +342,12 @@ impl GpuSolver {
         let last = self
             .frame
             .copy_last_substep(gpu, &mut encoder, &self.body)?;
+        let impulses = match &self.body.contacts {
+            Some(contacts) => contacts.copy_impulses(gpu, &mut encoder)?,
+            None => None,
+        };
         let submission = gpu.submit(encoder)?;
+        let impulses = impulses.map(|impulses| impulses.handed_over(&submission));
         let positions = positions.handed_over(&submission);
         let velocities = velocities.handed_over(&submission);
         let repaired = repaired.handed_over(&submission);
@@ -326,6 +361,9 @@ impl GpuSolver {
         let (positions, velocities) = (positions.collect(gpu)?, velocities.collect(gpu)?);
         self.host.load_state(&positions, &velocities);
         self.known_repaired = repaired.collect(gpu)?[0];
+        if let (Some(contacts), Some(impulses)) = (&self.body.contacts, impulses) {
+            contacts.load(&mut self.host, &impulses.collect(gpu)?);
+        }
         if let Some((predicted, multipliers, tet_solve)) = last {
             let (predicted, multipliers) = (predicted.collect(gpu)?, multipliers.collect(gpu)?);
             let slot = |tet| self.body.layout.tet_slot(tet);

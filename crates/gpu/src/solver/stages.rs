@@ -32,7 +32,7 @@ pub struct StageTimes {
     pub predict: f64,
     /// Solving tets.
     pub solve: f64,
-    /// Handles, distances, volumes, colliders and clearing of multipliers.
+    /// Handles, distances, volumes, contacts, colliders and clearing of multipliers.
     pub other: f64,
     /// Update of velocities.
     pub update: f64,

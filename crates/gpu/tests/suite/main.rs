@@ -7,6 +7,7 @@
 
 mod colliders;
 mod coloring;
+mod contacts;
 mod device;
 mod edits;
 mod extremes;

@@ -25,6 +25,8 @@
 //! new overlap is that of Giles, Diaz and Yuksel 2025 with a time in place of a factor. Cost: about 100 operations a
 //! contact apart, 160 one that presses.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use incise_graph::{Coloring, GraphError};
 
@@ -34,7 +36,7 @@ use crate::float::{load, store, weight};
 use crate::particles::{Particles, number};
 use crate::substep::Substep;
 use crate::team::parallel_rounds;
-use crate::{Float, XpbdError};
+use crate::{Float, StepSettings, XpbdError};
 
 /// Colors of a kind that are solved in parallel; the contacts beyond are the tail.
 const PARALLEL_COLORS: usize = 16;
@@ -92,6 +94,36 @@ pub struct ContactState {
     pub pressure: f64,
     /// The force in N on the vertex with friction, as `pressure`. The other side has its opposite.
     pub force: DVec3,
+}
+
+/// A contact as plain numbers for a kernel. See [`crate::Solver::contact_data`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactData<R> {
+    /// The particles: the two of a pair and twice [`u32::MAX`], or a vertex and the corners of a triangle.
+    pub particles: [u32; 4],
+    /// Of a pair the unit normal and 0; of a vertex and a triangle [`FaceContact::beyond`], three zeros where there is
+    /// none, and the thickness.
+    pub numbers: [R; 4],
+}
+
+/// Contacts that a kernel solves together: a color, or a tail. See [`crate::Solver::contact_rounds`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ContactRound {
+    /// Their places in the solving order.
+    pub contacts: Range<usize>,
+    /// Whether they may share particles: then those that do are solved one after the other.
+    pub is_tail: bool,
+}
+
+/// What all contacts of a step have in common, as plain numbers for a kernel. See [`crate::Solver::contact_factors`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactFactors<R> {
+    /// The coefficient of friction.
+    pub friction: R,
+    /// The part of an old overlap that a substep leaves.
+    pub kept: R,
+    /// By how much the foot of a vertex may lie outside of a side of its triangle, in altitudes.
+    pub margin: R,
 }
 
 impl ContactLaw {
@@ -295,14 +327,6 @@ fn inside<R: Float>(second: R, third: R) -> Option<[R; 2]> {
     Some([b * scale - margin, c * scale - margin])
 }
 
-/// What all contacts of a substep have in common.
-#[derive(Clone, Copy, Debug)]
-struct Factors<R> {
-    friction: R,
-    /// α: the part of an overlap that a substep leaves.
-    kept: R,
-}
-
 /// Contacts that one thread or several solve at once: a color, or a tail.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -490,6 +514,59 @@ impl<R: Float> Contacts<R> {
         Ok(())
     }
 
+    /// All contacts as plain numbers, in solving order.
+    pub(crate) fn data(&self) -> impl Iterator<Item = ContactData<R>> + '_ {
+        let none = u32::MAX;
+        let pairs = self.pairs.iter().map(move |pair| {
+            let ([a, b], [x, y, z]) = (pair.particles, R::components(pair.normal));
+            ContactData {
+                particles: [a, b, none, none],
+                numbers: [x, y, z, R::ZERO],
+            }
+        });
+        let faces = self.faces.iter().map(|face| {
+            let [a, b, c] = face.beyond;
+            ContactData {
+                particles: face.particles,
+                numbers: [a, b, c, face.thickness],
+            }
+        });
+        pairs.chain(faces)
+    }
+
+    /// The rounds of the solving order.
+    pub(crate) fn rounds(&self) -> impl Iterator<Item = ContactRound> + '_ {
+        let pairs = self.pairs.len();
+        self.rounds.iter().map(move |round| {
+            let first = if round.is_pairs { 0 } else { pairs };
+            ContactRound {
+                contacts: first + round.from..first + round.to,
+                is_tail: round.is_tail,
+            }
+        })
+    }
+
+    /// What all contacts have in common, if they are declared.
+    pub(crate) fn factors(&self, settings: &StepSettings) -> Option<ContactFactors<R>> {
+        let law = self.law?;
+        // The time may be 0.
+        let part = settings.substep_time() / law.recovery_time;
+        Some(ContactFactors {
+            friction: R::from_f64(law.friction),
+            kept: R::from_f64(1.0 - part.min(1.0)),
+            margin: R::from_f64(MARGIN),
+        })
+    }
+
+    /// Takes the impulses of a frame or a part that was computed elsewhere.
+    pub(crate) fn load(&mut self, impulses: &[[R; 4]], settings: &StepSettings) {
+        assert_eq!(impulses.len(), self.pairs.len() + self.faces.len());
+        self.impulses.clear();
+        self.impulses
+            .extend(impulses.iter().copied().map(R::particle));
+        self.per_impulse = per_impulse(settings);
+    }
+
     /// All contacts at the present positions, in solving order. Forces are those of the last frame.
     pub(crate) fn states<'a>(
         &'a self,
@@ -537,7 +614,7 @@ impl<R: Float> Contacts<R> {
         index: usize,
         contact: &impl Contact<R, K>,
         particles: &Particles<R>,
-        factors: Factors<R>,
+        factors: ContactFactors<R>,
     ) {
         let numbers = contact.particles();
         let cells = numbers.map(|p| &particles.cells[p as usize]);
@@ -604,6 +681,12 @@ impl<R: Float> Contacts<R> {
             R::write(total, [x + dx, y + dy, z + dz, normal + change]);
         }
     }
+}
+
+/// Force in N for an impulse of a frame.
+fn per_impulse(settings: &StepSettings) -> f64 {
+    let time = settings.substep_time();
+    1.0 / (time * time * f64::from(settings.substeps))
 }
 
 fn refuse(source: GraphError) -> XpbdError {
@@ -676,8 +759,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
         if substep.number == 0 || self.impulses.len() != count {
             self.impulses.clear();
             self.impulses.resize_with(count, nothing);
-            let time = substep.settings.substep_time();
-            self.per_impulse = 1.0 / (time * time * f64::from(substep.settings.substeps));
+            self.per_impulse = per_impulse(substep.settings);
         }
         self.multipliers.clear();
         if substep.settings.iterations > 1 {
@@ -688,14 +770,9 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
 
     /// One pass over all contacts, round after round, within a color in parallel.
     fn solve(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) {
-        let (Some(law), false) = (self.law, self.rounds.is_empty()) else {
+        let (Some(factors), false) = (self.factors(substep.settings), self.rounds.is_empty())
+        else {
             return;
-        };
-        // The time may be 0.
-        let part = substep.settings.substep_time() / law.recovery_time;
-        let factors = Factors {
-            friction: R::from_f64(law.friction),
-            kept: R::from_f64(1.0 - part.min(1.0)),
         };
         let this = &*self;
         let threads = rayon::current_num_threads();

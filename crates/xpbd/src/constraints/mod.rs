@@ -22,7 +22,9 @@ pub(crate) use blades::Blades;
 pub use blades::SolidBlade;
 pub(crate) use colliders::{Colliders, Obstacle, outside};
 pub(crate) use contacts::Contacts;
-pub use contacts::{ContactLaw, ContactState, FaceContact, PairContact};
+pub use contacts::{
+    ContactData, ContactFactors, ContactLaw, ContactRound, ContactState, FaceContact, PairContact,
+};
 pub(crate) use distances::{Distance, Distances};
 pub use distances::{DistanceConstraint, DistanceData};
 pub(crate) use scalar::ScalarConstraint;

@@ -5,8 +5,9 @@ use incise_graph::{Coloring, GraphError, Schedule};
 use super::Solver;
 use crate::constraints::{Distance, Distances, TetVolume, Volumes};
 use crate::{
-    AttachmentData, ContactLaw, ContactState, DistanceConstraint, DistanceData, FaceContact, Float,
-    PairContact, Pose, SolidBlade, VolumeConstraint, VolumeData, XpbdError,
+    AttachmentData, ContactData, ContactFactors, ContactLaw, ContactRound, ContactState,
+    DistanceConstraint, DistanceData, FaceContact, Float, PairContact, Pose, SolidBlade,
+    StepSettings, VolumeConstraint, VolumeData, XpbdError,
 };
 
 impl<R: Float> Solver<R> {
@@ -378,12 +379,39 @@ impl<R: Float> Solver<R> {
         faces: (&[FaceContact], &Coloring),
     ) -> Result<(), XpbdError> {
         let count = self.particle_count();
+        self.note(|changes| changes.contacts = true);
         self.constraints.contacts.set(count, law, pairs, faces)
     }
 
     /// Removes all contacts and their memory; any method may step again.
     pub fn clear_contacts(&mut self) {
+        self.note(|changes| changes.contacts = true);
         self.constraints.contacts.clear();
+    }
+
+    /// Returns all contacts as plain numbers for a kernel, in solving order, pairs first.
+    pub fn contact_data(&self) -> impl Iterator<Item = ContactData<R>> + '_ {
+        self.constraints.contacts.data()
+    }
+
+    /// Returns which contacts are solved together, round after round; a round without contacts is not listed.
+    pub fn contact_rounds(&self) -> impl Iterator<Item = ContactRound> + '_ {
+        self.constraints.contacts.rounds()
+    }
+
+    /// Returns what all contacts have in common in a step, if [contacts are set](Solver::has_contacts).
+    #[must_use]
+    pub fn contact_factors(&self, settings: &StepSettings) -> Option<ContactFactors<R>> {
+        self.constraints.contacts.factors(settings)
+    }
+
+    /// Loads what contacts pressed in a frame or a part of one that was computed elsewhere, for [`Solver::contacts`]: of
+    /// each contact in solving order the sum of its impulses on the vertex, and that of their normal parts, all in kg·m.
+    ///
+    /// # Panics
+    /// If the number of impulses is not that of contacts.
+    pub fn load_contact_impulses(&mut self, impulses: &[[R; 4]], settings: &StepSettings) {
+        self.constraints.contacts.load(impulses, settings);
     }
 
     /// Returns whether contacts were set, even if there are none at present.

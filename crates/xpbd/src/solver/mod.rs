@@ -526,6 +526,27 @@ impl<R: Float> Solver<R> {
         keep: bool,
     ) -> Result<StepReport, XpbdError> {
         let _span = tracing::debug_span!("xpbd::step").entered();
+        self.check_step(settings, &part)?;
+        self.update_layout(schedule);
+        let jittered = if part.start == 0 { self.prepare() } else { 0 };
+        let Self {
+            particles,
+            tets,
+            constraints,
+            stepper,
+            ..
+        } = self;
+        let repaired = stepper.frame(particles, tets, constraints, settings, part, keep);
+        Ok(StepReport { repaired, jittered })
+    }
+
+    /// Checks that some substeps of a frame with these settings can be made, as a step does first; for a device that
+    /// solves on its own.
+    ///
+    /// # Errors
+    /// If the settings do not pass [`StepSettings::check`], the part ends before it begins or beyond the frame, or the
+    /// method does not solve what the solver has.
+    pub fn check_step(&self, settings: &StepSettings, part: &Range<u32>) -> Result<(), XpbdError> {
         settings.check()?;
         if part.start > part.end || part.end > settings.substeps {
             return Err(XpbdError::Setting {
@@ -540,16 +561,6 @@ impl<R: Float> Solver<R> {
         if self.stepper.meter.is_some() {
             settings.method.check_forces()?;
         }
-        self.update_layout(schedule);
-        let jittered = if part.start == 0 { self.prepare() } else { 0 };
-        let Self {
-            particles,
-            tets,
-            constraints,
-            stepper,
-            ..
-        } = self;
-        let repaired = stepper.frame(particles, tets, constraints, settings, part, keep);
-        Ok(StepReport { repaired, jittered })
+        Ok(())
     }
 }
