@@ -3,6 +3,9 @@
 //! One scene runs without merging, with merging, and with background re-clustering, alternating frame by frame, so that
 //! other load of the machine affects all alike. The mesh stays at rest, and the solver makes 20 Gauss-Seidel iterations
 //! per frame. At the end all derived data is checked.
+//!
+//! A second table has what the strokes leave with snap 0, 0.1 and 0.2: tets, pieces, crumbs that stayed with a larger part,
+//! thin tets, tets flatter than any of the uncut body, which need shorter substeps, colors, and the time of a frame.
 
 use std::fmt::Write;
 use std::num::NonZeroU32;
@@ -14,8 +17,8 @@ use comfy_table::Table;
 use incise::clustering::cluster;
 use incise::coloring::auto;
 use incise::graph::Incidence;
-use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
+use incise::mesh::{TetMesh, tet_quality};
 use incise::scene::{ReclusterSpec, StrokeSpec};
 use incise::{FrameReport, Scene, Simulation};
 
@@ -37,6 +40,9 @@ pub(crate) struct DegradationArguments {
     /// Number of solver threads.
     #[arg(long, value_name = "N", default_value_t = 1)]
     threads: usize,
+    /// Write the scene of the strokes to this file and measure nothing; `incise run FILE --out DIR` renders it.
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
     /// Write the tables to this file as well.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -72,6 +78,15 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
         None => generated,
     };
     let model = model.with_context(|| format!("there is no model {}", arguments.model))?;
+    if let Some(path) = &arguments.scene {
+        let mut scene = scene_at_rest(model, arguments.strokes, 0.1);
+        if let Some(mesh) = &mut scene.body[0].mesh {
+            // The scene may lie in another folder.
+            *mesh = std::path::absolute(&*mesh)?;
+        }
+        std::fs::write(path, scene.to_toml()?)?;
+        return Ok(());
+    }
     let mut runs = runs(model, arguments.strokes, arguments.threads)?;
     let frames = FRAMES * arguments.strokes;
     for frame in 0..frames {
@@ -92,6 +107,8 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
     );
     writeln!(text, "{}", course(&runs, frames))?;
     writeln!(text, "\n{}", costs(&runs))?;
+    let left = shapes(model, arguments)?;
+    writeln!(text, "\n## What the strokes leave, by snap\n\n{left}")?;
     for run in &runs {
         run.simulation.check()?;
     }
@@ -102,14 +119,20 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
     Ok(())
 }
 
-fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>> {
+/// A body at rest and strokes into it, with the default solver of the experiment.
+fn scene_at_rest(model: &Model, strokes: u64, snap: f64) -> Scene {
     let mut scene = Scene::built_in();
     scene.world = incise::scene::WorldSpec::default();
     model.put_into(&mut scene.body[0]);
     scene.solver.substeps = 1.into();
     scene.solver.iterations = 20;
     let scale = scene.body[0].scale;
-    scene.stroke = small_strokes(&model.mesh, scale, strokes);
+    scene.stroke = small_strokes(&model.mesh, scale, strokes, snap);
+    scene
+}
+
+fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>> {
+    let mut scene = scene_at_rest(model, strokes, 0.1);
     let mut runs = Vec::new();
     let renewing = Some(ReclusterSpec {
         threshold: 1.25,
@@ -133,7 +156,7 @@ fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>>
 }
 
 /// Short sweeps of a short blade into the surface at random places, one after another.
-fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64) -> Vec<StrokeSpec> {
+fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64, snap: f64) -> Vec<StrokeSpec> {
     let surface = mesh.surface();
     let low = mesh.positions.iter().copied().reduce(DVec3::min);
     let high = mesh.positions.iter().copied().reduce(DVec3::max);
@@ -155,7 +178,7 @@ fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64) -> Vec<StrokeSpec> {
             frames: [FRAMES * i, FRAMES * i + FRAMES - 1],
             blade: blade.map(|x| (x * scale).to_array()).to_vec(),
             path: vec![[0.0; 3], (along * scale).to_array()],
-            snap: 0.1,
+            snap,
             solid: None,
         }
     };
@@ -237,6 +260,78 @@ fn course(runs: &[Run], frames: u64) -> Table {
         }
     }
     table
+}
+
+/// Dihedral angles in degrees below which a tet counts as thin.
+const THIN: f64 = 5.0;
+
+/// Tets, pieces, crumbs, thin and stiff tets, colors and frame time after each part of the strokes, for each snap distance.
+/// The simulations run frame by frame in turn.
+fn shapes(model: &Model, arguments: &DegradationArguments) -> anyhow::Result<Table> {
+    let DegradationArguments {
+        strokes, threads, ..
+    } = *arguments;
+    let mut runs = Vec::new();
+    for snap in [0.0, 0.1, 0.2] {
+        let scene = scene_at_rest(model, strokes, snap);
+        let simulation = Simulation::with_threads(&scene, threads)?;
+        let quality = simulation.mesh().quality();
+        runs.push((snap, simulation, quality.min_altitude, Vec::new(), 0));
+    }
+    let mut table = table([
+        "strokes",
+        "snap",
+        "tets",
+        "pieces",
+        "crumbs kept",
+        "tets with a dihedral below 5°",
+        "tets flatter than all uncut ones",
+        "colors",
+        "frame without a cut ms (median)",
+        "times the first part",
+    ]);
+    let mut first = vec![None; runs.len()];
+    for part in 1..=PARTS {
+        for _ in FRAMES * strokes * (part - 1) / PARTS..FRAMES * strokes * part / PARTS {
+            for (_, simulation, _, times, crumbs) in &mut runs {
+                let report = simulation.step()?;
+                match &report.cut {
+                    Some(cut) => *crumbs += cut.crumbs,
+                    None => times.push(report.ms.total),
+                }
+            }
+        }
+        for ((snap, simulation, flattest, times, crumbs), first) in runs.iter_mut().zip(&mut first)
+        {
+            let mesh = simulation.mesh();
+            let tets = mesh.tets.iter();
+            let tets = tets.map(|tet| tet_quality(tet.map(|p| mesh.positions[p.index()])));
+            let (mut thin, mut flat) = (0, 0);
+            for quality in tets {
+                thin += usize::from(quality.min_dihedral < THIN);
+                flat += usize::from(quality.min_altitude < *flattest);
+            }
+            let ms = median(times.drain(..));
+            let first = *first.get_or_insert(ms);
+            let report = simulation.report();
+            table.add_row([
+                (strokes * part / PARTS).to_string(),
+                format!("{snap}"),
+                report.tets.to_string(),
+                report.pieces.to_string(),
+                crumbs.to_string(),
+                thin.to_string(),
+                flat.to_string(),
+                report.colors.to_string(),
+                format!("{ms:.3}"),
+                format!("{:.2}", ms / first),
+            ]);
+        }
+    }
+    for (_, simulation, ..) in &runs {
+        simulation.check()?;
+    }
+    Ok(table)
 }
 
 /// Time of the updates after a cut.
