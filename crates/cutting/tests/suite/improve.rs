@@ -3,7 +3,7 @@
 use glam::DVec3;
 use incise_cutting::{
     CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, ImproveOptions, PieceTracker, Plane,
-    Skin, Sweep, cut_plane, cut_surface, improve, remove_tets,
+    Skin, cut_plane, cut_surface, improve, remove_tets,
 };
 use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
 use proptest::prelude::*;
@@ -232,52 +232,6 @@ fn ten_thin_slices() {
         assert_eq!(count, same);
         assert!(4 * tets < grown);
         assert!(2 * slivers < bad);
-    }
-}
-
-/// Short strokes beside and across each other.
-fn short_strokes(mesh: &TetMesh, count: usize, snap: f64, improves: bool) -> Patient {
-    let mut patient = Patient::new(mesh, mesh.positions.clone());
-    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 8.0).cbrt();
-    for i in 0..count {
-        let direction =
-            |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(3, 20 * i + 3 * k + j)));
-        let center = DVec3::splat(0.5) + 0.3 * direction(0);
-        let along = direction(1).normalize_or(DVec3::X) * 3.0 * edge;
-        let path = direction(2).normalize_or(DVec3::Y) * 3.0 * edge;
-        let pose = |t: f64| [center - along + path * t, center + along + path * t];
-        let rest = patient.positions.clone();
-        let mut stroke = Sweep::new(&patient.body, &rest, &pose(-1.0), options(snap)).unwrap();
-        for t in [0.0, 1.0] {
-            let positions = patient.positions.clone();
-            let delta = stroke
-                .advance(&mut patient.body, &positions, &pose(t))
-                .unwrap();
-            delta.extend_particles(&mut patient.positions);
-            patient.pieces.apply_delta(&patient.body, &delta);
-            patient.skin.apply_delta(&delta);
-            patient.near.extend(delta.created_particles());
-        }
-        if improves {
-            patient.improve(&ImproveOptions::default(), |_| false);
-        }
-    }
-    patient
-}
-
-/// Strokes across each other: the body grows to a fraction of what it would.
-#[test]
-fn many_short_strokes() {
-    for snap in [0.0, 0.1] {
-        let mesh = jittered_box(5, 0.1, 5);
-        let counts = [false, true].map(|improves| {
-            let patient = short_strokes(&mesh, 20, snap, improves);
-            let mesh = patient.body.mesh();
-            (mesh.tets.len(), slivers(mesh), patient.pieces.count())
-        });
-        println!("strokes, snap {snap}: {} -> {counts:?}", mesh.tets.len());
-        let [(grown, bad, _), (tets, slivers, _)] = counts;
-        assert!(2 * tets < grown && 2 * slivers < bad);
     }
 }
 
