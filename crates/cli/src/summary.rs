@@ -57,11 +57,7 @@ impl Summary {
         let mut stages = Table::new();
         stages.load_style(UTF8_FULL_CONDENSED);
         stages.set_header(["ms per frame", "median", "worst", "median with a cut"]);
-        let has_contact = self.last.contact.is_some();
         for (name, stage) in STAGES {
-            if name == "contact" && !has_contact {
-                continue;
-            }
             let [all, cutting] = [&self.times, &self.cutting].map(|times| sorted(times, stage));
             let row = [
                 name.to_owned(),
@@ -89,16 +85,6 @@ impl Summary {
         ]);
         counts.add_row(["particles".to_owned(), self.last.particles.to_string()]);
         counts.add_row(["pieces".to_owned(), self.last.pieces.to_string()]);
-        if let Some(contact) = &self.last.contact {
-            counts.add_row([
-                "contacts that press, and deepest at the end".to_owned(),
-                format!(
-                    "{}, {:.1}% of an edge",
-                    contact.active,
-                    100.0 * contact.max_depth
-                ),
-            ]);
-        }
         counts.add_row([
             "clusters, colors".to_owned(),
             format!("{}, {}", self.last.clusters, self.last.colors),

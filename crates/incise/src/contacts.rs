@@ -34,9 +34,6 @@ const PARTICLE: usize = 4 + 4 + 24;
 const TRIANGLE: usize = 24 + 24 + 32;
 /// Pieces that have touched do so until their gap is this part of a mean edge.
 const TOUCHING: f64 = 0.02;
-/// Depth in mean edges from which an overlap is told, and for how many frames it has to last: an impact is over before.
-const DEEP: f64 = 0.1;
-pub(crate) const DEEP_FRAMES: u32 = 10;
 /// The sine of the angle between two triangles from which the edge between them counts as convex.
 const FLAT: f64 = 1e-3;
 /// The cosine between the normals of two triangles below which they face each other, and that above which they do not.
@@ -100,17 +97,6 @@ pub(crate) struct TouchChange {
     pub(crate) begins: bool,
 }
 
-/// The deepest contact of a frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Overlap {
-    /// In m.
-    pub(crate) depth: f64,
-    /// In mean edges of the surface.
-    pub(crate) edges: f64,
-    /// A particle of either side.
-    pub(crate) particles: [u32; 2],
-}
-
 /// What of an island touches.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
@@ -124,8 +110,6 @@ pub(crate) struct Contacts {
     faces: Vec<FaceContact>,
     /// Ascending by pieces.
     touches: Vec<Touch>,
-    /// For how many frames a contact has been deep.
-    deep_frames: u32,
     /// Those of the frame before.
     #[cfg_attr(feature = "save", serde(skip))]
     before: Vec<Touch>,
@@ -147,8 +131,6 @@ struct Room {
     pairs: Vec<PairContact>,
     /// The touches of the present frame, one a contact.
     touches: Vec<Touch>,
-    /// The deepest contact of the present frame.
-    deepest: Option<Overlap>,
 }
 
 /// An error of the detector: it comes with wrong input from this crate only, since the scene was checked.
@@ -194,7 +176,6 @@ impl Contacts {
             face_colors: Coloring::default(),
             faces: Vec::new(),
             touches: Vec::new(),
-            deep_frames: 0,
             before: Vec::new(),
             changes: Vec::new(),
             milliseconds: 0.0,
@@ -221,7 +202,6 @@ impl Contacts {
         self.read(solver);
         let parts = self.detector.intervals(&self.room.velocities, time);
         self.room.touches.clear();
-        self.room.deepest = None;
         self.milliseconds = milliseconds(start.elapsed());
         parts.min(substeps)
     }
@@ -316,21 +296,9 @@ impl Contacts {
         let (near, touches) = (TOUCHING * self.detector.mean_edge(), &self.touches);
         let touched =
             |pieces: &[u32; 2]| touches.binary_search_by_key(pieces, |t| t.pieces).is_ok();
-        let Room {
-            touches: out,
-            deepest,
-            ..
-        } = &mut self.room;
-        let edge = self.detector.mean_edge();
+        let out = &mut self.room.touches;
         each!(solver, solver => {
             for contact in solver.contacts() {
-                if contact.depth > deepest.map_or(0.0, |deepest| deepest.depth) {
-                    *deepest = Some(Overlap {
-                        depth: contact.depth,
-                        edges: contact.depth / edge,
-                        particles: [contact.vertex, contact.against],
-                    });
-                }
                 let presses = contact.pressure > 0.0;
                 if !presses && contact.depth < -near {
                     continue;
@@ -373,16 +341,6 @@ impl Contacts {
             self.changes
                 .extend(new.map(|pieces| TouchChange { pieces, begins }));
         }
-    }
-
-    /// Counts the frames in which a contact is deep; returns the deepest one in the frame in which these are too many.
-    pub(crate) fn lasting_overlap(&mut self) -> Option<Overlap> {
-        let deepest = self.room.deepest.filter(|deepest| deepest.edges > DEEP);
-        self.deep_frames = match deepest {
-            Some(_) => self.deep_frames.saturating_add(1),
-            None => 0,
-        };
-        deepest.filter(|_| self.deep_frames == DEEP_FRAMES)
     }
 
     /// Lets go of all contacts, where there is nothing left that could touch.

@@ -20,7 +20,7 @@ use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::compute_device::ComputeDevice;
-use crate::contacts::{Contacts, DEEP_FRAMES, Overlap};
+use crate::contacts::Contacts;
 use crate::distance::Distances;
 use crate::forces::Measured;
 use crate::grab::{Grab, Grabs};
@@ -582,29 +582,7 @@ impl Island {
             contacts.note(solver, cuttable, pieces);
         }
         contacts.end_frame();
-        if let Some(overlap) = contacts.lasting_overlap() {
-            self.warn_of_overlap(overlap);
-        }
         Ok(report)
-    }
-
-    /// Warns of surfaces that stay inside each other.
-    fn warn_of_overlap(&mut self, overlap: Overlap) {
-        let body_of = |particle: u32| {
-            let tet = self.cuttable.around(ParticleId(particle)).next();
-            tet.map(|tet| self.body_of_tet(tet))
-        };
-        let mut bodies: Vec<usize> = overlap.particles.into_iter().filter_map(body_of).collect();
-        bodies.sort_unstable();
-        bodies.dedup();
-        let message = format!(
-            "surfaces stay inside each other by up to {:.2e} m, {:.0}% of an edge, for {DEEP_FRAMES} frames: take more \
-             substeps or smaller frames, and see that nothing holds the parts where they overlap",
-            overlap.depth,
-            100.0 * overlap.edges
-        );
-        self.warnings
-            .push(Warning::new(WarningCode::ContactDepth, &bodies, message));
     }
 
     /// Warns when VBD begins to miss the accuracy wanted.

@@ -42,8 +42,6 @@ pub enum WarningCode {
     StrokeMissed,
     /// A stroke has cut where pinned particles keep both sides together.
     PinnedCut,
-    /// Surfaces stay inside each other by more than a tenth of a mean edge.
-    ContactDepth,
     /// The substep is too short for single precision.
     ShortSubstepF32,
     /// Tets were softened to keep `kappa_limit`.

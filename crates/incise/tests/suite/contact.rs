@@ -7,7 +7,7 @@ use incise::scene::{
     AttachmentSpec, Backend, ContactPairs, ContactSpec, Method, Precision, Region, SleepSpec,
     SolverSpec, StrokeSpec,
 };
-use incise::{Body, Event, Scene, Simulation, SimulationBuilder, Warning, WarningCode};
+use incise::{Body, Event, Scene, Simulation, SimulationBuilder};
 
 use crate::support::{scene, state};
 
@@ -845,42 +845,4 @@ fn a_thickness_parts_bodies_but_not_a_cut() {
     // The cut has not opened: the sides have the positions that they would have without it.
     let sides = gap(&|x| x.x, 0.15625, &|_| true);
     assert!(sides.1 - sides.0 < 0.01 * thickness, "{sides:?}");
-}
-
-/// The frames of a simulation that tell of surfaces inside each other, with what they tell.
-fn told_of_depth(simulation: &mut Simulation, frames: u64) -> Vec<(u64, Warning)> {
-    let mut told = Vec::new();
-    for frame in 0..frames {
-        let warnings = simulation.step().unwrap().warnings().to_vec();
-        let deep = warnings
-            .into_iter()
-            .filter(|w| w.code == WarningCode::ContactDepth);
-        told.extend(deep.map(|warning| (frame, warning)));
-    }
-    told
-}
-
-#[test]
-fn bodies_that_are_held_inside_each_other_are_told_once() {
-    let mut builder = Simulation::builder();
-    builder.solver(solver(Precision::F64, 20));
-    builder.add_body(cube(DVec3::new(5.0, 0.0, 0.0)));
-    builder.add_body(cube(DVec3::ZERO).pinned(|_| true));
-    builder.add_body(cube(dvec3(0.02, 0.01, 0.8 * EDGE)).pinned(|_| true));
-    builder.contact(ContactSpec::default());
-    let mut simulation = builder.build().unwrap();
-    let told = told_of_depth(&mut simulation, 30);
-    assert_eq!(told.len(), 1, "{told:?}");
-    let (frame, warning) = &told[0];
-    assert_eq!((*frame, warning.location.as_str()), (9, "bodies 1, 2"));
-    assert!(warning.message.contains("inside each other"), "{warning}");
-}
-
-#[test]
-fn an_impact_and_a_stack_are_not_told_of_depth() {
-    let mut builder = stack(3, Precision::F32);
-    builder.add_body(cube(dvec3(0.0, 0.0, 4.0 * EDGE)));
-    let mut simulation = builder.build().unwrap();
-    let told = told_of_depth(&mut simulation, 60);
-    assert!(told.is_empty(), "{told:?}");
 }
