@@ -58,6 +58,9 @@ impl Summary {
         stages.load_style(UTF8_FULL_CONDENSED);
         stages.set_header(["ms per frame", "median", "worst", "median with a cut"]);
         for (name, stage) in STAGES {
+            if name == "contact" && self.last.contact.is_none() {
+                continue;
+            }
             let [all, cutting] = [&self.times, &self.cutting].map(|times| sorted(times, stage));
             let row = [
                 name.to_owned(),

@@ -235,6 +235,11 @@ impl ContactDetector {
         Ok(())
     }
 
+    /// Searches in the next update, even if nothing has moved: to measure what a search costs.
+    pub fn search_again(&mut self) {
+        self.search_is_due = true;
+    }
+
     /// The settings.
     #[must_use]
     pub fn settings(&self) -> &ContactSettings {

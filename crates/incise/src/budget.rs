@@ -2,6 +2,7 @@
 //!
 //! Copies of the solvers run a few frames to measure the cost of a substep of Gauss-Seidel and of a frame of two-level
 //! VBD. All islands together may use [`SHARE`] of the budget, each in proportion to the cost of its accuracy. Without a
+//! The search for contacts is measured, too: it comes once a frame, whatever the substeps. Without a
 //! stated accuracy the rest buys more substeps. After cuts the cost grows with the number of tets, and substeps are
 //! reduced if they no longer fit. The choice depends on measured times, so results differ from run to run. Cost: a few
 //! frames at the start.
@@ -11,6 +12,7 @@ use std::time::Instant;
 use incise_xpbd::StepSettings;
 
 use crate::Error;
+use crate::backend::AnySolver;
 use crate::compute_device::ComputeDevice;
 use crate::island::{Budget, Island, adopt};
 use crate::island_builder::demands;
@@ -28,10 +30,36 @@ const FINEST: f64 = 0.01;
 /// Frames that are measured after a first one, of which the fastest counts.
 const FRAMES: u32 = 3;
 
-/// Milliseconds of a frame of a copy of an island's solver with some settings.
+/// Finds the contacts of a copy of an island at its present positions, hands them to a copy of its solver, and tells the
+/// milliseconds of a frame that takes; none without contact.
+fn detect(island: &Island, solver: &mut AnySolver) -> Result<f64, Error> {
+    let Some(mut contacts) = island.contacts.clone() else {
+        return Ok(0.0);
+    };
+    let Island {
+        cuttable,
+        pieces,
+        settings,
+        ..
+    } = island;
+    let (time, mut fastest) = (settings.time_step, f64::INFINITY);
+    for frame in 0..=FRAMES {
+        // Bodies that move are searched for in nearly all frames.
+        contacts.search_again();
+        contacts.begin_frame(solver, time, settings.substeps);
+        contacts.update(solver, cuttable, pieces, time)?;
+        if frame > 0 {
+            fastest = fastest.min(contacts.take_milliseconds());
+        }
+    }
+    Ok(fastest)
+}
+
+/// Milliseconds of a frame of a copy of an island's solver with some settings, the search for contacts left out.
 fn measure(island: &Island, spec: &SolverSpec, settings: &StepSettings) -> Result<f64, Error> {
     let mut solver = island.solver.clone();
     solver.backend_mut().end_vbd();
+    detect(island, &mut solver)?;
     solver.prepare(spec, &ComputeDevice::default())?;
     solver
         .backend_mut()
@@ -69,7 +97,11 @@ pub(crate) fn fit(islands: &mut [Island], spec: &SolverSpec, budget: f64) -> Res
         let those = each.filter(|(island, _)| open(island) == wanted);
         those.map(|(_, cost)| cost.1).sum()
     };
-    let factor = (SHARE * budget - of(false)).max(0.0) / of(true);
+    let mut detection = 0.0;
+    for island in islands.iter() {
+        detection += detect(island, &mut island.solver.clone())?;
+    }
+    let factor = (SHARE * budget - detection - of(false)).max(0.0) / of(true);
     for (island, (of_one, whole_cost)) in islands.iter_mut().zip(costs) {
         if !open(island) {
             continue;

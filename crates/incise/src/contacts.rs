@@ -34,6 +34,11 @@ const PARTICLE: usize = 4 + 4 + 24;
 const TRIANGLE: usize = 24 + 24 + 32;
 /// Pieces that have touched do so until their gap is this part of a mean edge.
 const TOUCHING: f64 = 0.02;
+/// A contact that stays deeper than this part of a mean edge is told.
+pub(crate) const DEEP: f64 = 0.1;
+/// For how long it has to: s, and recovery times, within which an overlap of the start has parted.
+const DEEP_TIME: f64 = 0.25;
+const RECOVERIES: f64 = 5.0;
 /// The sine of the angle between two triangles from which the edge between them counts as convex.
 const FLAT: f64 = 1e-3;
 /// The cosine between the normals of two triangles below which they face each other, and that above which they do not.
@@ -97,6 +102,17 @@ pub(crate) struct TouchChange {
     pub(crate) begins: bool,
 }
 
+/// Two pieces that have overlapped for long, by their numbers in an island.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Overlap {
+    /// Ascending; equal where a piece overlaps itself.
+    pub(crate) pieces: [u32; 2],
+    /// Of the deepest contact, in mean edges.
+    pub(crate) depth: f64,
+    /// For how long contacts have been deep, in s.
+    pub(crate) time: f64,
+}
+
 /// What of an island touches.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
@@ -110,12 +126,17 @@ pub(crate) struct Contacts {
     faces: Vec<FaceContact>,
     /// Ascending by pieces.
     touches: Vec<Touch>,
+    /// For how long in s a contact has been deep at the end of each frame.
+    deep_time: f64,
     /// Those of the frame before.
     #[cfg_attr(feature = "save", serde(skip))]
     before: Vec<Touch>,
     /// Pieces that began to touch or ended it in the last frame, until they are asked for.
     #[cfg_attr(feature = "save", serde(skip))]
     changes: Vec<TouchChange>,
+    /// The overlap to warn about, until it is asked for.
+    #[cfg_attr(feature = "save", serde(skip))]
+    overlap: Option<Overlap>,
     /// What the search and the coloring of the last frame took, until it is asked for.
     #[cfg_attr(feature = "save", serde(skip))]
     milliseconds: f64,
@@ -129,6 +150,8 @@ struct Room {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
     pairs: Vec<PairContact>,
+    /// The depth in m and the particles of the deepest contact at the end of a part of a frame.
+    deepest: (f64, [u32; 2]),
     /// The touches of the present frame, one a contact.
     touches: Vec<Touch>,
 }
@@ -176,8 +199,10 @@ impl Contacts {
             face_colors: Coloring::default(),
             faces: Vec::new(),
             touches: Vec::new(),
+            deep_time: 0.0,
             before: Vec::new(),
             changes: Vec::new(),
+            overlap: None,
             milliseconds: 0.0,
             room: Room::default(),
         })
@@ -194,6 +219,11 @@ impl Contacts {
     /// Follows a cut or a removal of tets; `mesh` is the one after it.
     pub(crate) fn apply_delta(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
         self.detector.apply_delta(mesh, delta);
+    }
+
+    /// Searches in the next update, even if nothing has moved.
+    pub(crate) fn search_again(&mut self) {
+        self.detector.search_again();
     }
 
     /// Into how many parts the frame to come is divided.
@@ -296,9 +326,17 @@ impl Contacts {
         let (near, touches) = (TOUCHING * self.detector.mean_edge(), &self.touches);
         let touched =
             |pieces: &[u32; 2]| touches.binary_search_by_key(pieces, |t| t.pieces).is_ok();
-        let out = &mut self.room.touches;
+        let Room {
+            touches: out,
+            deepest,
+            ..
+        } = &mut self.room;
+        *deepest = (0.0, [0; 2]);
         each!(solver, solver => {
             for contact in solver.contacts() {
+                if contact.depth > deepest.0 {
+                    *deepest = (contact.depth, [contact.against, contact.vertex]);
+                }
                 let presses = contact.pressure > 0.0;
                 if !presses && contact.depth < -near {
                     continue;
@@ -315,6 +353,40 @@ impl Contacts {
                 out.push(Touch { pieces: key, force, torque: point.cross(force) });
             }
         });
+    }
+
+    /// Judges the depth at the end of a frame of `time` s, after [`Self::note`]. Once contacts have been deep for long
+    /// there is an [`Overlap`]; the next one comes only after a frame without a deep contact.
+    pub(crate) fn judge_depth(&mut self, mesh: &CuttableMesh, pieces: &PieceTracker, time: f64) {
+        let (deepest, particles) = self.room.deepest;
+        let depth = deepest / self.detector.mean_edge();
+        // No number without an edge.
+        if depth.partial_cmp(&DEEP) != Some(std::cmp::Ordering::Greater) {
+            self.deep_time = 0.0;
+            return;
+        }
+        let limit = DEEP_TIME + RECOVERIES * self.law.recovery_time;
+        let was_told = self.deep_time > limit;
+        self.deep_time += time;
+        if was_told || self.deep_time <= limit {
+            return;
+        }
+        let piece_of = |particle: u32| {
+            let mut around = mesh.around(ParticleId(particle));
+            around.next().map(|tet| pieces.piece_of(tet))
+        };
+        if let [Some(a), Some(b)] = particles.map(piece_of) {
+            self.overlap = Some(Overlap {
+                pieces: [a.min(b), a.max(b)],
+                depth,
+                time: self.deep_time,
+            });
+        }
+    }
+
+    /// Takes the overlap that became worth a warning in the last frame.
+    pub(crate) fn take_overlap(&mut self) -> Option<Overlap> {
+        self.overlap.take()
     }
 
     /// Sums up what was noted, by pieces.
@@ -346,6 +418,7 @@ impl Contacts {
     /// Lets go of all contacts, where there is nothing left that could touch.
     pub(crate) fn end(&mut self, solver: &mut AnySolver) -> Result<(), Error> {
         self.room.touches.clear();
+        self.deep_time = 0.0;
         self.end_frame();
         (self.pair_colors, self.face_colors) = (Coloring::default(), Coloring::default());
         self.faces.clear();

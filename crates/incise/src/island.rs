@@ -582,6 +582,7 @@ impl Island {
             contacts.note(solver, cuttable, pieces);
         }
         contacts.end_frame();
+        contacts.judge_depth(cuttable, pieces, time);
         Ok(report)
     }
 

@@ -381,6 +381,11 @@ impl Simulation {
                     Event::ContactEnded { pieces, bodies }
                 });
             }
+            if let Some(overlap) = contacts.take_overlap() {
+                let of_scene = overlap.pieces.map(|piece| pieces.of_scene(number, piece));
+                let warning = Warning::of_contact_depth(&overlap, of_scene);
+                island.warnings.push(warning);
+            }
         }
         ms.contact = ms.contact.min(ms.solve);
         ms.solve -= ms.contact;

@@ -53,6 +53,16 @@ fn a_run_prints_a_table_and_writes_its_files() {
 }
 
 #[test]
+fn the_table_has_a_row_of_contact_only_where_contact_is_declared() {
+    let sandbox = Sandbox::with_scene();
+    sandbox.write("touching.toml", format!("{SCENE}\n[contact]\n"));
+    for (scene, declared) in [("scene.toml", false), ("touching.toml", true)] {
+        let table = sandbox.good(&["run", scene, "--frames", "1", "--no-pictures"]);
+        assert_eq!(table.contains("contact"), declared, "{table}");
+    }
+}
+
+#[test]
 fn every_line_has_exactly_the_promised_keys() {
     let sandbox = Sandbox::with_scene();
     sandbox.good(&[

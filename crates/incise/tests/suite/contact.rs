@@ -7,7 +7,7 @@ use incise::scene::{
     AttachmentSpec, Backend, ContactPairs, ContactSpec, Method, Precision, Region, SleepSpec,
     SolverSpec, StrokeSpec,
 };
-use incise::{Body, Event, Scene, Simulation, SimulationBuilder};
+use incise::{Body, Event, Scene, Simulation, SimulationBuilder, Warning, WarningCode};
 
 use crate::support::{scene, state};
 
@@ -338,6 +338,42 @@ fn an_overlap_at_the_start_parts_slowly() {
     }
     assert!(last > EDGE - 0.1 * depth, "{last}");
     assert_eq!(simulation.report().contact.unwrap().max_depth, 0.0);
+}
+
+/// The warnings that come in a second with two cubes that overlap by a depth and whose particles are pinned or not.
+fn warnings_of_an_overlap(depth: f64, pinned: bool) -> Vec<Warning> {
+    let mut builder = Simulation::builder();
+    builder.solver(solver(Precision::F64, 10));
+    for at in [DVec3::ZERO, dvec3(0.02, 0.01, EDGE - depth)] {
+        builder.add_body(cube(at).pinned(move |_| pinned));
+    }
+    builder.contact(ContactSpec::default());
+    let mut simulation = builder.build().unwrap();
+    let mut warnings = Vec::new();
+    for _ in 0..60 {
+        simulation.step().unwrap();
+        warnings.extend_from_slice(simulation.report().warnings());
+    }
+    if pinned {
+        assert!(simulation.report().contact.unwrap().max_depth > 0.0);
+    }
+    warnings
+}
+
+/// An overlap of more than a tenth of an edge that does not part is told once, with its bodies and pieces; one that is
+/// not as deep or that parts is not.
+#[test]
+fn a_deep_contact_is_told() {
+    let deep = warnings_of_an_overlap(0.02, true);
+    assert_eq!(deep.len(), 1, "{deep:?}");
+    assert_eq!(deep[0].code, WarningCode::ContactDepth);
+    assert_eq!(deep[0].location, "bodies 0, 1");
+    assert!(
+        deep[0].message.starts_with("pieces 0 and 1 overlap by 2"),
+        "{deep:?}"
+    );
+    assert_eq!(warnings_of_an_overlap(0.004, true), []);
+    assert_eq!(warnings_of_an_overlap(0.02, false), []);
 }
 
 /// How many vertices are inside a tet of another piece, farther than `depth` m from each of its faces.
