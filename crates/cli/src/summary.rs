@@ -88,6 +88,16 @@ impl Summary {
         ]);
         counts.add_row(["particles".to_owned(), self.last.particles.to_string()]);
         counts.add_row(["pieces".to_owned(), self.last.pieces.to_string()]);
+        if let Some(contact) = &self.last.contact {
+            counts.add_row([
+                "contacts that press, and deepest at the end".to_owned(),
+                format!(
+                    "{}, {:.1}% of an edge",
+                    contact.active,
+                    100.0 * contact.max_depth
+                ),
+            ]);
+        }
         counts.add_row([
             "clusters, colors".to_owned(),
             format!("{}, {}", self.last.clusters, self.last.colors),
