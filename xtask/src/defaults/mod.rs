@@ -92,9 +92,8 @@ fn check(rows: &[Row]) -> anyhow::Result<()> {
                 }
             }
             Row::Organ(row) => {
-                if let Some([error, reference]) = row.error {
-                    ensure!(error < row.accuracy + reference, "{row:?}");
-                }
+                let [error, reference] = row.error;
+                ensure!(error < row.accuracy + reference, "{row:?}");
             }
             Row::Load(rows) => {
                 for row in rows {

@@ -18,8 +18,9 @@ use crate::Float;
 /// new.
 const AGED: f64 = 0.75;
 
-/// In a frame with a cut, which has a new matrix to fill, a factor is stale only below this part of its first rate.
-const AGED_IN_CUT: f64 = 0.5;
+/// In a frame with a cut, which has a new matrix to fill, a factor is stale only below this part of its first rate. Faces
+/// that open slow conjugate gradients down with a new factor as well.
+const AGED_IN_CUT: f64 = 0.25;
 
 /// Iterations from which the rate of convergence of a solution is judged: fewer say nothing about the factor.
 const RATED_ITERATIONS: u32 = 8;

@@ -12,7 +12,7 @@ use crate::particles::Particles;
 pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2, 1, 0]];
 
 /// A tet seen from one of its particles: 32 bytes in single precision.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct CornerTerm<R> {
     /// The other particles, in an order that makes `n · a` positive at rest.

@@ -82,10 +82,12 @@ fn largest_root<R: Float>(rho: R) -> R {
     for _ in 0..ROOT_STEPS {
         let slope = three * (t * t - R::ONE);
         let next = t - (t * (t * t - three) - two * rho) / slope;
-        // At the double root the slope vanishes; rounding must not throw the iterate about.
-        if next < t && next > R::ONE {
-            t = next;
+        // From above, the iterates fall to the root; at a double root, where the slope vanishes, rounding must not throw
+        // them about.
+        if !(next < t && next > R::ONE) {
+            break;
         }
+        t = next;
     }
     t
 }

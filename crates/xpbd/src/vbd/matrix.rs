@@ -9,6 +9,7 @@ use rayon::prelude::*;
 
 use super::PARALLEL_ROWS;
 use super::block::{Block, apply};
+use super::row_slices::threads_for;
 use super::stars::StarData;
 use crate::Float;
 
@@ -78,13 +79,6 @@ impl Pattern {
             rows: ends,
         }
     }
-}
-
-/// Threads that are worth their start for a number of rows, at least 1.
-fn threads_for(rows: usize) -> usize {
-    rayon::current_num_threads()
-        .min(rows.div_ceil(PARALLEL_ROWS))
-        .max(1)
 }
 
 impl<R: Float> Blocks<R> {
@@ -240,21 +234,4 @@ impl<R: Float> Blocks<R> {
             .map(|&c| c as usize)
             .zip(&self.blocks[range])
     }
-}
-
-/// The rows of a matrix in one slice a thread, each with its blocks.
-pub(super) fn row_slices<'a, B>(
-    offsets: &[usize],
-    mut blocks: &'a mut [B],
-) -> Vec<(Range<usize>, &'a mut [B])> {
-    let rows = offsets.len() - 1;
-    let parts = threads_for(rows);
-    let mut slices = Vec::with_capacity(parts);
-    for part in 0..parts {
-        let (start, end) = (rows * part / parts, rows * (part + 1) / parts);
-        let (own, later) = blocks.split_at_mut(offsets[end] - offsets[start]);
-        blocks = later;
-        slices.push((start..end, own));
-    }
-    slices
 }

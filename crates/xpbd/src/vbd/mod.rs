@@ -30,6 +30,7 @@ mod hessian;
 mod history;
 mod matrix;
 mod newton_matrix;
+mod row_slices;
 mod settings;
 mod stars;
 mod start;

@@ -9,9 +9,9 @@
 use incise_graph::{DisjointSets, GraphError, Incidence, Schedule};
 use rayon::prelude::*;
 
-use super::PARALLEL_ROWS;
 use super::constraints::ConstraintTerms;
 use super::corner_term::{CornerTerm, takes_part};
+use super::row_slices::row_slices;
 use crate::constraints::ScalarConstraint;
 use crate::{Float, Solver};
 
@@ -74,8 +74,6 @@ impl<R: Float> StarData<R> {
         }
         self.offsets.clear();
         self.offsets.push(0);
-        self.terms.clear();
-        self.tets.clear();
         let list = &solver.tets.list;
         // What comes after the tets are distances and volumes.
         let tets_of = |p: u32| {
@@ -87,19 +85,26 @@ impl<R: Float> StarData<R> {
             end += tets_of(p).filter(|(_, tet)| takes_part(tet)).count();
             self.offsets.push(end);
         }
-        let terms = self.order.par_iter().with_min_len(PARALLEL_ROWS);
-        let terms = terms.flat_map_iter(|&p| {
-            tets_of(p).filter_map(move |(t, tet)| {
-                let corner = tet.particles.iter().position(|&corner| corner == p)?;
-                Some((CornerTerm::new(&tet.to_f64(), corner)?, t))
-            })
-        });
-        let mut lists = (
-            std::mem::take(&mut self.terms),
-            std::mem::take(&mut self.tets),
-        );
-        lists.par_extend(terms);
-        (self.terms, self.tets) = lists;
+        self.terms.resize(end, CornerTerm::default());
+        self.tets.resize(end, 0);
+        let slices = row_slices(&self.offsets, &mut self.terms).into_iter();
+        let slices: Vec<_> = slices
+            .zip(row_slices(&self.offsets, &mut self.tets))
+            .collect();
+        let order = &self.order;
+        slices
+            .into_par_iter()
+            .for_each(|((rows, terms), (_, tets))| {
+                let elements = order[rows].iter().flat_map(|&p| {
+                    tets_of(p).filter_map(move |(t, tet)| {
+                        let corner = tet.particles.iter().position(|&corner| corner == p)?;
+                        Some((CornerTerm::new(&tet.to_f64(), corner)?, t))
+                    })
+                });
+                for ((term, tet), element) in terms.iter_mut().zip(tets).zip(elements) {
+                    (*term, *tet) = element;
+                }
+            });
         self.tet_count = solver.tet_count();
         let volume = solver.tets.rest_volumes.iter().sum::<f64>();
         self.size = (6.0 * volume / self.tet_count.max(1) as f64)
