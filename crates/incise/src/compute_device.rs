@@ -119,9 +119,6 @@ impl ComputeDevice {
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     let solver = &scene.solver;
     forces::check(&scene.report, solver.method, true)?;
-    if scene.contact.is_some() {
-        return Err(value("contact", "declared", "absent on a GPU"));
-    }
     if solver.precision == Precision::F64 {
         return Err(value("solver.precision", "f64", "f32 on a GPU"));
     }
