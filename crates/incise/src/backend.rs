@@ -3,6 +3,7 @@
 //! Functions that depend on the device or the method are in [`SolverBackend`]. Edits and measurements that all solvers
 //! of `incise-xpbd` share are written once, for either precision, with `each!` and `each_mut!`.
 
+use std::ops::Range;
 use std::time::Instant;
 
 use glam::{DMat3, DVec3};
@@ -350,6 +351,20 @@ impl<R: Real> SolverBackend for Backend<R> {
             None if keep => solver.step_keeping_residuals(schedule, settings),
             None => solver.step(schedule, settings),
         };
+        step.map_err(|source| Error::Xpbd {
+            field: "solver".into(),
+            source,
+        })
+    }
+
+    fn step_part(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        part: Range<u32>,
+        keep: bool,
+    ) -> Result<StepReport, Error> {
+        let step = self.solver.step_part(schedule, settings, part, keep);
         step.map_err(|source| Error::Xpbd {
             field: "solver".into(),
             source,

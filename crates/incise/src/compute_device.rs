@@ -122,9 +122,6 @@ pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     if let Some(stroke) = scene.stroke.iter().position(StrokeSpec::is_solid) {
         solid_blade::check(&format!("stroke[{stroke}]"), solver.method, true)?;
     }
-    if scene.contact.is_some() {
-        return Err(value("contact", "declared", "absent on a GPU"));
-    }
     if solver.precision == Precision::F64 {
         return Err(value("solver.precision", "f64", "f32 on a GPU"));
     }

@@ -1,8 +1,9 @@
 //! [`Device`]: the solver of an island on a GPU.
 //!
 //! Cuts and edits are made on the host's solver and then applied to the device. The state stays on the device until it
-//! is requested. Cost: a submit a frame.
+//! is requested, or after each part of a frame with contact. Cost: a submit a frame.
 
+use std::ops::Range;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -56,6 +57,20 @@ impl SolverBackend for Device {
             self.solver.step(schedule, settings)?;
         }
         Ok(StepReport::default())
+    }
+
+    fn step_part(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        part: Range<u32>,
+        keep: bool,
+    ) -> Result<StepReport, Error> {
+        self.solver.step_part(schedule, settings, part, keep)?;
+        Ok(StepReport {
+            repaired: self.read_back()?,
+            ..StepReport::default()
+        })
     }
 
     fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {

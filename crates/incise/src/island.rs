@@ -563,6 +563,8 @@ impl Island {
         let Some(contacts) = contacts else {
             return Ok(report);
         };
+        // Contacts are found here, from the state at the start of the frame.
+        report.repaired += solver.backend_mut().read_back()?;
         let (time, substeps) = (settings.time_step, settings.substeps);
         let parts = contacts.begin_frame(solver, time, substeps);
         let end = |part: u32| {
@@ -571,12 +573,9 @@ impl Island {
         };
         for part in 0..parts {
             contacts.update(solver, cuttable, pieces, time / f64::from(parts))?;
-            let schedule = &partition.schedule;
-            let step = each_mut!(solver, solver => {
-                let range = end(part)..end(part + 1);
-                let step = solver.step_part(schedule, settings, range, keeping_residuals);
-                step.map_err(|source| Error::Xpbd { field: "solver".into(), source })?
-            });
+            let (schedule, range) = (&partition.schedule, end(part)..end(part + 1));
+            let backend = solver.backend_mut();
+            let step = backend.step_part(schedule, settings, range, keeping_residuals)?;
             report.repaired += step.repaired;
             report.jittered += step.jittered;
             contacts.note(solver, cuttable, pieces);

@@ -1,5 +1,7 @@
 //! [`SolverBackend`]: the interface of the runtime to a solver on the CPU or on a GPU.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use incise_graph::Schedule;
 use incise_xpbd::{Energy, Forces, Pose, Residuals, StepReport, StepSettings, Volume};
@@ -31,6 +33,15 @@ pub(crate) trait SolverBackend {
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
+        keep: bool,
+    ) -> Result<StepReport, Error>;
+
+    /// Advances by some of the substeps of a frame; the state is known here afterwards, so that contacts can be found.
+    fn step_part(
+        &mut self,
+        schedule: &Schedule,
+        settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> Result<StepReport, Error>;
 

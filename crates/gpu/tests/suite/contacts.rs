@@ -54,6 +54,15 @@ fn noise(seed: u64) -> f64 {
     (x >> 11) as f64 / (1_u64 << 53) as f64
 }
 
+/// A number below a count, of a seed.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "rounding down is the purpose"
+)]
+fn picked(seed: u64, count: usize) -> u32 {
+    (noise(seed) * count as f64) as u32
+}
+
 fn direction(seed: u64) -> DVec3 {
     dvec3(noise(seed), noise(seed + 1), noise(seed + 2)) - 0.5
 }
@@ -62,7 +71,7 @@ fn direction(seed: u64) -> DVec3 {
 /// many on one vertex, which need a tail.
 fn random(mesh: &TetMesh, seed: u64, number: u32) -> List {
     let count = mesh.positions.len();
-    let pick = |k: u64| (noise(seed + k) * count as f64) as u32;
+    let pick = |k: u64| picked(seed + k, count);
     let mut list = List::default();
     for k in (0..u64::from(number)).map(|k| 100 * k) {
         let [a, b, c] = [pick(k), pick(k + 1), pick(k + 2)];
@@ -74,7 +83,7 @@ fn random(mesh: &TetMesh, seed: u64, number: u32) -> List {
         }
         // Every second contact is that of one vertex.
         let vertex = if k % 200 == 0 { HUB } else { c };
-        let tet = mesh.tets[(noise(seed + k + 3) * mesh.tets.len() as f64) as usize].map(|p| p.0);
+        let tet = mesh.tets[picked(seed + k + 3, mesh.tets.len()) as usize].map(|p| p.0);
         if !tet[..3].contains(&vertex) {
             let n = direction(seed + k + 20);
             list.faces.push(FaceContact {
@@ -182,7 +191,7 @@ fn contacts_press_and_rub() {
         "contacts_press_and_rub",
         LAW,
         &settings,
-        &[0..settings.substeps],
+        std::slice::from_ref(&(0..settings.substeps)),
     );
 }
 
@@ -194,7 +203,12 @@ fn contacts_without_friction_that_part_at_once() {
     };
     let test = "contacts_without_friction_that_part_at_once";
     let settings = gently();
-    twins(test, law, &settings, &[0..settings.substeps]);
+    twins(
+        test,
+        law,
+        &settings,
+        std::slice::from_ref(&(0..settings.substeps)),
+    );
 }
 
 #[test]
@@ -204,7 +218,12 @@ fn contacts_keep_multipliers() {
         ..gently()
     };
     let test = "contacts_keep_multipliers";
-    twins(test, LAW, &settings, &[0..settings.substeps]);
+    twins(
+        test,
+        LAW,
+        &settings,
+        std::slice::from_ref(&(0..settings.substeps)),
+    );
 }
 
 /// Contacts are set again within the frame; the impulses are those since then.
@@ -341,7 +360,7 @@ proptest! {
         };
         let positions: Vec<DVec3> =
             (0..particles as u64).map(|p| direction(seed + 5 * p)).collect();
-        let pick = |k: u64| (noise(seed + 1000 + k) * particles as f64) as u32;
+        let pick = |k: u64| picked(seed + 1000 + k, particles);
         let mut list = List::default();
         for k in 0..pairs {
             let particles = [pick(2 * k), pick(2 * k + 1)];

@@ -17,6 +17,8 @@ mod forces;
 #[cfg(feature = "gpu")]
 mod gpu;
 #[cfg(feature = "gpu")]
+mod gpu_contact;
+#[cfg(feature = "gpu")]
 mod gpu_live;
 #[cfg(feature = "gpu")]
 mod gpu_settings;
