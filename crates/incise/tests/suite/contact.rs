@@ -345,7 +345,8 @@ fn warnings_of_an_overlap(depth: f64, pinned: bool) -> Vec<Warning> {
     let mut builder = Simulation::builder();
     builder.solver(solver(Precision::F64, 10));
     for at in [DVec3::ZERO, dvec3(0.02, 0.01, EDGE - depth)] {
-        builder.add_body(cube(at).pinned(move |_| pinned));
+        let body = cube(at);
+        builder.add_body(if pinned { body.pinned(|_| true) } else { body });
     }
     builder.contact(ContactSpec::default());
     let mut simulation = builder.build().unwrap();
