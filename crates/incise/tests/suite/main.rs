@@ -22,6 +22,7 @@ mod gpu_knobs;
 mod gpu_live;
 mod grab;
 mod interaction;
+mod joining;
 mod kappa;
 mod knobs;
 mod live;
