@@ -47,6 +47,42 @@ impl CuttableMesh {
         })
     }
 
+    /// Appends another mesh with its cuts. Its particles and tets follow those of this mesh, in their order, and so do
+    /// its boundary triangles, which keep their tags. Sweeps that are under way on either mesh end. O(mesh appended).
+    ///
+    /// # Panics
+    /// If both meshes together have 2²⁹ tets or more.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_cutting::CuttableMesh;
+    /// use incise_mesh::kuhn_box;
+    ///
+    /// let mut bodies = CuttableMesh::new(kuhn_box([2, 1, 1], DVec3::ONE))?;
+    /// let other = CuttableMesh::new(kuhn_box([1, 1, 1], DVec3::ONE))?;
+    /// let triangles = bodies.boundary_count() + other.boundary_count();
+    /// bodies.append(&other);
+    /// bodies.check()?;
+    /// assert_eq!(bodies.boundary_count(), triangles);
+    /// assert_eq!(bodies.mesh().pieces().count, 2);
+    /// # Ok::<(), incise_cutting::CutError>(())
+    /// ```
+    pub fn append(&mut self, other: &Self) {
+        let first = self.mesh.positions.len();
+        let shifted = |p: ParticleId| ParticleId::new(first + p.index());
+        let [tets, appended] = [&self.mesh, &other.mesh].map(|mesh| mesh.tets.len() as f64);
+        let volume = tets * self.mean_volume + appended * other.mean_volume;
+        self.mean_volume = volume / (tets + appended).max(1.0);
+        self.mesh.positions.extend(&other.mesh.positions);
+        let corners = other.mesh.tets.iter().map(|tet| tet.map(shifted));
+        self.mesh.tets.extend(corners);
+        self.stars.append(&other.stars);
+        self.faces.append(&other.faces);
+        let bent = other.bent.iter().map(|(&p, &by)| (shifted(p), by));
+        self.bent.extend(bent);
+    }
+
     /// Returns the mesh at rest, with all cuts made so far.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {

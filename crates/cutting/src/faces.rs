@@ -100,6 +100,21 @@ impl Faces {
         faces
     }
 
+    /// Appends the faces of another mesh, whose tets get the next numbers. Its boundary triangles keep their order and
+    /// follow those of this mesh.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let first = index(self.links.len());
+        // Links to the boundary are set below.
+        let links = other.links.iter().map(|&code| match code & BOUNDARY {
+            0 => first + code,
+            _ => INNER,
+        });
+        self.links.extend(links);
+        for &(face, tag) in &other.boundary {
+            self.open(Face(first + face.0), tag);
+        }
+    }
+
     /// The boundary triangles, in an order that is the same for the same history.
     pub(crate) fn boundary(&self) -> &[(Face, FaceTag)] {
         &self.boundary

@@ -155,6 +155,28 @@ impl PieceTracker {
         }
     }
 
+    /// Returns the number of pieces so far, with those that have vanished. O(1).
+    #[must_use]
+    pub fn total(&self) -> usize {
+        self.pieces.len()
+    }
+
+    /// Appends the pieces of a mesh that is appended to this one: see [`CuttableMesh::append`]. Their numbers, also
+    /// those of pieces that have vanished, follow those of this mesh in their order. O(tets appended).
+    ///
+    /// # Panics
+    /// If there are 2³² pieces or more.
+    pub fn append(&mut self, other: &Self) {
+        let first = u32::try_from(self.pieces.len()).expect("fewer than 2³² pieces");
+        self.piece_of
+            .extend(other.piece_of.iter().map(|piece| first + piece));
+        self.pieces.extend(other.pieces.iter().map(|record| Record {
+            parent: record.parent.map(|parent| first + parent),
+            ..*record
+        }));
+        self.alive += other.alive;
+    }
+
     /// Applies a delta and returns the detached and vanished pieces.
     ///
     /// A detached part gets the next number. The part that keeps the old number is the one whose search was still

@@ -30,6 +30,15 @@ impl VertexStars {
         stars
     }
 
+    /// Appends the stars of another mesh, whose particles and tets get the next numbers.
+    pub(crate) fn append(&mut self, other: &Self) {
+        let first = u32::try_from(self.next.len()).expect("fewer than 2³⁰ tets");
+        let shifted = |&slot: &u32| if slot == NONE { NONE } else { first + slot };
+        self.head.extend(other.head.iter().map(shifted));
+        self.next.extend(other.next.iter().map(shifted));
+        self.previous.extend(other.previous.iter().map(shifted));
+    }
+
     pub(crate) fn push_particle(&mut self) {
         self.head.push(NONE);
     }

@@ -60,6 +60,18 @@ impl StrokeRegistry {
         self.apply_delta_to_others(u32::MAX, cuttable, delta, options.reach());
     }
 
+    /// Appends what strokes left on a mesh that is appended to one with so many particles: see
+    /// [`CuttableMesh::append`]. Linear in the registry appended.
+    pub fn append(&mut self, other: &Self, particles: usize) {
+        let first = self.strokes;
+        self.known
+            .extend(other.known.iter().map(|(&(p, place), &(stroke, mark))| {
+                let p = ParticleId::new(particles + p.index());
+                ((p, place), (first + stroke, mark))
+            }));
+        self.strokes += other.strokes;
+    }
+
     /// Removes the particles from number `particles` on, which an undone cut had added. Linear in the registry.
     pub fn truncate(&mut self, particles: usize) {
         self.known.retain(|key, _| key.0.index() < particles);

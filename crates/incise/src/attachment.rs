@@ -113,6 +113,14 @@ impl Attachment {
         })
     }
 
+    /// Takes other numbers where its island's particles and frames follow those of another one.
+    pub(crate) fn renumber(&mut self, first_particle: usize, first_frame: u32) {
+        for particle in &mut self.particles {
+            *particle += first_particle;
+        }
+        self.number += first_frame;
+    }
+
     /// Its key in the scene; `attachment` if a program added it.
     pub(crate) fn field(&self) -> &str {
         &self.field

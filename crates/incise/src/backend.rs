@@ -130,6 +130,31 @@ impl AnySolver {
         }
     }
 
+    /// A solver on the processor with the particles, tets and handles of this one and then those of another one, without
+    /// other constraints and the data of a method: see [`Solver::joined_with`]. Uses the last readback of a device.
+    pub(crate) fn joined_with(&self, other: &Self) -> Result<Self, Error> {
+        if let (Self::Double(one), Self::Double(other)) = (self, other) {
+            let (solver, vbd) = (one.solver.joined_with(&other.solver), None);
+            return Ok(Self::Double(Backend { solver, vbd }));
+        }
+        let (Some(one), Some(other)) = (self.single(), other.single()) else {
+            let what = "bodies in different precisions are joined";
+            return Err(Error::Inconsistent(what.into()));
+        };
+        let (solver, vbd) = (one.joined_with(other), None);
+        Ok(Self::Single(Backend { solver, vbd }))
+    }
+
+    /// The solver in single precision, if it is in that.
+    fn single(&self) -> Option<&Solver<f32>> {
+        match self {
+            Self::Single(backend) => Some(&backend.solver),
+            Self::Double(_) => None,
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => Some(device.solver.cached_host()),
+        }
+    }
+
     /// Applies a cut to particles, tets and masses. Costs what the cut touched.
     pub(crate) fn apply_delta(
         &mut self,

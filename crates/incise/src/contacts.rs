@@ -208,6 +208,26 @@ impl Contacts {
         })
     }
 
+    /// Contact of two islands that became one with this mesh and so many pieces of the first. What touches is known
+    /// further on. The sides of cuts are no longer told apart by pairs: the search takes care of their particles.
+    pub(crate) fn joined(
+        spec: &ContactSpec,
+        mesh: &CuttableMesh,
+        one: &Self,
+        other: &Self,
+        first_piece: u32,
+    ) -> Result<Self, Error> {
+        let bodies = [one.detector.body_of(), other.detector.body_of()].concat();
+        let mut joined = Self::new(spec, mesh, bodies)?;
+        let shifted = |touch: &Touch| Touch {
+            pieces: touch.pieces.map(|piece| first_piece + piece),
+            ..*touch
+        };
+        joined.touches.clone_from(&one.touches);
+        joined.touches.extend(other.touches.iter().map(shifted));
+        Ok(joined)
+    }
+
     /// Takes over other settings from the next frame on.
     pub(crate) fn set(&mut self, spec: &ContactSpec) -> Result<(), Error> {
         let settings = detector_settings(spec);

@@ -117,6 +117,16 @@ impl Distances {
         self.list.push(constraint);
     }
 
+    /// Appends those of an island whose particles get numbers from `first` on.
+    pub(crate) fn append(&mut self, other: &Self, first: u32) {
+        self.names.extend(&other.names);
+        let list = other.list.iter().map(|constraint| DistanceConstraint {
+            particles: constraint.particles.map(|p| first + p),
+            ..*constraint
+        });
+        self.list.extend(list);
+    }
+
     /// The constraint of a name.
     pub(crate) fn get_mut(&mut self, name: DistanceHandle) -> Option<&mut DistanceConstraint> {
         let index = self.names.iter().position(|n| *n == name)?;

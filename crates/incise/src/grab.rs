@@ -16,12 +16,7 @@ use crate::backend::{AnySolver, each, each_mut};
 
 /// Handle of an interactive grab in the simulation that returned it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Grab {
-    pub(crate) island: usize,
-    /// Index of the grab in the island, and the user number of the grab.
-    slot: usize,
-    user: u64,
-}
+pub struct Grab(pub(crate) u64);
 
 /// A grab and its handle in the solver.
 #[derive(Clone, Debug)]
@@ -29,8 +24,8 @@ pub struct Grab {
 struct ActiveGrab {
     /// Its number in the solver.
     handle: u32,
-    /// Number of grabs that have released it.
-    user: u64,
+    /// The present or last grab that has it.
+    grab: u64,
     held: bool,
     /// The point that was grabbed, and where it is to be at the end of the next frame.
     point: DVec3,
@@ -63,20 +58,24 @@ impl Grabs {
 
     /// The number of the frame of the solver that a grab has, and the target of its point, if it is held.
     pub(crate) fn held(&self, grab: Grab) -> Option<(u32, DVec3)> {
-        let active = self.active.get(grab.slot)?;
-        (active.held && active.user == grab.user).then_some((active.handle, active.to))
+        let mut active = self.active.iter();
+        let active = active.find(|active| active.held && active.grab == grab.0)?;
+        Some((active.handle, active.to))
     }
 
-    /// All grabs that are held; `island` is the number of the island.
-    pub(crate) fn all_held(&self, island: usize) -> impl Iterator<Item = Grab> + '_ {
-        let grabs = self.active.iter().enumerate();
-        grabs
-            .filter(|(_, grab)| grab.held)
-            .map(move |(slot, grab)| Grab {
-                island,
-                slot,
-                user: grab.user,
-            })
+    /// All grabs that are held.
+    pub(crate) fn all_held(&self) -> impl Iterator<Item = Grab> + '_ {
+        let held = self.active.iter().filter(|active| active.held);
+        held.map(|active| Grab(active.grab))
+    }
+
+    /// Appends those of an island whose handles get numbers from `first` on.
+    pub(crate) fn append(&mut self, other: &Self, first: u32) {
+        let active = other.active.iter().map(|active| ActiveGrab {
+            handle: first + active.handle,
+            ..active.clone()
+        });
+        self.active.extend(active);
     }
 
     /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
@@ -99,24 +98,23 @@ impl Grabs {
         };
         detach(solver, active.handle)?;
         active.held = false;
-        active.user += 1;
         Ok(true)
     }
 
     fn find(&mut self, grab: Grab) -> Option<&mut ActiveGrab> {
-        let active = self.active.get_mut(grab.slot)?;
-        (active.held && active.user == grab.user).then_some(active)
+        let mut active = self.active.iter_mut();
+        active.find(|active| active.held && active.grab == grab.0)
     }
 
-    /// Attaches particles to a free handle. `island` is the number of the island.
+    /// Attaches particles to a free handle for a new grab.
     pub(crate) fn take(
         &mut self,
-        island: usize,
+        grab: Grab,
         solver: &mut AnySolver,
         particles: &[usize],
         point: DVec3,
         compliance: f64,
-    ) -> Result<Grab, Error> {
+    ) -> Result<(), Error> {
         let vacant = self.active.iter().position(|grab| !grab.held);
         let slot = vacant.unwrap_or(self.active.len());
         each_mut!(solver, solver => {
@@ -130,10 +128,9 @@ impl Grabs {
                     .attach(p, handle, compliance, 0.0)
                     .map_err(|source| Error::Xpbd { field: "grab".into(), source })?;
             }
-            let user = self.active.get(slot).map_or(0, |grab| grab.user);
             let grab = ActiveGrab {
                 handle,
-                user,
+                grab: grab.0,
                 held: true,
                 point,
                 to: point,
@@ -144,7 +141,7 @@ impl Grabs {
                 Some(old) => *old = grab,
                 None => self.active.push(grab),
             }
-            Ok(Grab { island, slot, user })
+            Ok(())
         })
     }
 

@@ -3,6 +3,8 @@
 //! Mostly a single body. Each island has its own mesh, solver, partition, substeps and origin. A stiff body therefore
 //! does not slow down others, and a body moves bit-identically to a scene of its own. Cost: that of its parts.
 
+mod join;
+
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -779,25 +781,25 @@ impl Island {
     }
 
     /// Grabs the free particles within a radius around a point that belong to the piece of the particle `nearest`.
-    /// `number` is that of the island. Wakes the island.
+    /// Wakes the island.
     pub(crate) fn grab(
         &mut self,
-        number: usize,
+        grab: Grab,
         nearest: usize,
         point: DVec3,
         radius: f64,
         compliance: f64,
-    ) -> Result<Grab, Error> {
+    ) -> Result<(), Error> {
         let piece = self.piece_of(nearest);
         let near = self.holdable(point, radius).map(|(_, p)| p);
         let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
         let Self { grabs, solver, .. } = self;
-        let grab = grabs.take(number, solver, &particles, point, compliance)?;
+        grabs.take(grab, solver, &particles, point, compliance)?;
         if let (Some(forces), Some((handle, _))) = (&mut self.forces, self.grabs.held(grab)) {
             forces.forget(handle);
         }
         self.wake();
-        Ok(grab)
+        Ok(())
     }
 
     /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.

@@ -22,7 +22,7 @@ use crate::volume::Volumes;
 use crate::{Error, Scene, distance};
 
 /// Error message for too many materials.
-const TOO_MANY: &str =
+pub(crate) const TOO_MANY: &str =
     "at most 65,536 bodies and parts of other materials that are solved together";
 
 /// The bodies of an island before it is set up.

@@ -111,6 +111,24 @@ impl MergedMesh {
         self.numbers.push(numbers);
     }
 
+    /// Notes that island `other` was appended to island `into`, and later ones moved up. No number here changes.
+    /// O(particles).
+    pub(crate) fn join(&mut self, into: usize, other: usize) {
+        let of_other = self.numbers.remove(other);
+        let first = self.numbers[into].particles.len();
+        self.numbers[into].particles.extend(of_other.particles);
+        self.numbers[into].tets.extend(of_other.tets);
+        for (island, particle) in &mut self.locations {
+            let number = *island as usize;
+            if number == other {
+                *particle = ParticleId::new(first + particle.index());
+                *island = u32::try_from(into).expect("islands are numbered in 32 bits");
+            } else if number > other {
+                *island -= 1;
+            }
+        }
+    }
+
     /// The island of a particle and its number there. O(1).
     pub(crate) fn location(&self, particle: ParticleId) -> (usize, usize) {
         let (island, number) = self.locations[particle.index()];

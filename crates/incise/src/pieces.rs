@@ -72,6 +72,22 @@ impl PieceNumbers {
         }
     }
 
+    /// Notes that the pieces of island `other` were appended to those of island `into`, and later islands moved up. No
+    /// number in the scene changes. O(pieces).
+    pub(crate) fn join(&mut self, into: usize, other: usize) {
+        let of_other = self.of_island.remove(other);
+        let first = u32::try_from(self.of_island[into].0.len()).expect("fewer than 2³² pieces");
+        self.of_island[into].0.extend(of_other.0);
+        for piece in &mut self.pieces {
+            if piece.island == other {
+                piece.island = into;
+                piece.piece += first;
+            } else if piece.island > other {
+                piece.island -= 1;
+            }
+        }
+    }
+
     fn add(&mut self, number: Number) -> u32 {
         let id = u32::try_from(self.pieces.len()).expect("fewer pieces than particles");
         self.pieces.push(number);

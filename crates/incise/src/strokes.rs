@@ -238,6 +238,26 @@ impl Timeline {
         self.created.iter().any(|created| !created.is_empty())
     }
 
+    /// Returns an error that names a stroke whose blade moves through the bodies, since it follows each island's mesh.
+    pub(crate) fn check_join(&self) -> Result<(), Error> {
+        let mut strokes = self.strokes.iter();
+        match strokes.find(|stroke| !stroke.sweeps.is_empty()) {
+            Some(stroke) => {
+                let range = "a stroke that has ended when bodies are joined";
+                Err(value(&stroke.field, "under way", range))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Notes that island `other` was appended to island `into`, which had so many particles.
+    pub(crate) fn join(&mut self, into: usize, other: usize, particles: usize) {
+        if other < self.registries.len() {
+            let of_other = self.registries.remove(other);
+            self.registries[into].append(&of_other, particles);
+        }
+    }
+
     /// Applies a delta of an island that no stroke made to what strokes keep of its mesh.
     pub(crate) fn apply_delta(&mut self, number: usize, island: &Island, delta: &CutDelta) {
         for stroke in &mut self.strokes {

@@ -26,6 +26,17 @@ impl Volumes {
         any.then_some(Self { compliances })
     }
 
+    /// Those of two islands with so many materials; `None` if neither has them.
+    pub(crate) fn joined(
+        one: (Option<&Self>, usize),
+        other: (Option<&Self>, usize),
+    ) -> Option<Self> {
+        let of = |(volumes, materials): (Option<&Self>, usize)| {
+            volumes.map_or_else(|| vec![None; materials], |v| v.compliances.clone())
+        };
+        Self::new([of(one), of(other)].concat())
+    }
+
     /// Constrains all tets.
     pub(crate) fn constrain(
         &self,

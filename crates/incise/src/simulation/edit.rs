@@ -305,24 +305,73 @@ impl Simulation {
         Err(removed("attachment", handle))
     }
 
-    /// Adds a distance constraint (a suture, a rod or a spring) between two particles of one body, or of bodies that
-    /// distances already join, from the next frame on. O(particles of the bodies + distances). On a device the
-    /// positions are read back.
+    /// Adds a distance constraint (a suture, a rod or a spring) between two particles from the next frame on. On a device
+    /// the positions are read back.
     ///
-    /// Bodies that no distance joins have separate solvers. To join them while the simulation runs, declare a distance
-    /// between them before it starts, such as one with `tension_only` that is longer than the scene.
+    /// Bodies that have separate solvers get a common one, with the most substeps that one of them needs, and stay
+    /// together when the distance is removed. Numbers of particles, tets and pieces, handles, motion and cuts are kept.
+    /// Measured forces and residuals begin again with the next frame. O(particles of the bodies + distances); where
+    /// solvers are joined O(tets of both), with new clusters, colors and buffers on a device.
     ///
     /// # Errors
-    /// If a body does not exist, the bodies have solvers of their own, a value lies outside its range, both ends are on one
-    /// particle, or the device is lost; nothing has changed then.
+    /// If a body does not exist, a value lies outside its range, both ends are on one particle, a stroke is moving through
+    /// bodies that have separate solvers, or the device is lost; nothing has changed then.
+    ///
+    /// # Example
+    /// Two bodies fly apart until a suture holds them together.
+    /// ```
+    /// use incise::scene::{DistanceSpec, EndSpec};
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let body = |x: f64| format!("[[body]]\nshape = {{ kind = \"box\", tets = 200 }}\nposition = [{x}, 0.0, 0.0]\n");
+    /// let scene = format!("[world]\ngravity = [0.0, 0.0, 0.0]\n{}{}", body(-1.0), body(1.0));
+    /// let mut simulation = Simulation::new(&Scene::from_toml(&scene)?)?;
+    /// simulation.set_velocities(|x| x.signum())?;
+    /// simulation.step()?;
+    /// let ends = [-0.5, 0.5].map(|x| [x, 0.0, 0.0]);
+    /// simulation.add_distance(&DistanceSpec {
+    ///     from: EndSpec { body: 0, point: ends[0] },
+    ///     to: EndSpec { body: 1, point: ends[1] },
+    ///     length: Some(1.2),
+    ///     compliance: 0.0,
+    ///     tension_only: true,
+    /// })?;
+    /// for _ in 0..60 {
+    ///     simulation.step()?;
+    /// }
+    /// let gap = |s: &Simulation| {
+    ///     let half = s.positions().len() / 2;
+    ///     let right = s.positions()[..half].iter().map(|x| x.x).fold(f64::MIN, f64::max);
+    ///     let left = s.positions()[half..].iter().map(|x| x.x).fold(f64::MAX, f64::min);
+    ///     left - right
+    /// };
+    /// assert!(gap(&simulation) < 1.3);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
     pub fn add_distance(&mut self, spec: &DistanceSpec) -> Result<DistanceHandle, Error> {
-        let island = self.island_of_both(spec)?;
+        let from = self.island_of("distance.from.body", spec.from.body)?;
+        let to = self.island_of("distance.to.body", spec.to.body)?;
         self.read_back()?;
         let name = DistanceHandle(self.state.next.distance);
-        let island = &mut self.state.islands[island];
-        let constraint = island.distance(spec)?;
-        island.distances.add(name, constraint);
-        island.update_distances()?;
+        let add = |island: &mut Island| {
+            let constraint = island.distance(spec)?;
+            island.distances.add(name, constraint);
+            island.update_distances()
+        };
+        if from == to {
+            add(&mut self.state.islands[from])?;
+        } else {
+            let (into, other) = (from.min(to), from.max(to));
+            let state = &self.state;
+            let make = || state.joined(into, &state.islands[other]);
+            let mut joined = match &self.pool {
+                Some(pool) => pool.install(make),
+                None => make(),
+            }?;
+            add(&mut joined)?;
+            self.state.put_joined(into, other, joined);
+            self.fit_budget()?;
+        }
         self.state.next.distance += 1;
         Ok(name)
     }
@@ -364,14 +413,15 @@ impl Simulation {
         Err(removed("distance", handle))
     }
 
-    /// Adds a body at rest from the next frame on. It has its own solver with the present settings. Its particles and
-    /// tets get the next numbers. O(tets) of the body; of all bodies if there was one.
+    /// Adds a body at rest from the next frame on. Its particles and tets get the next numbers. It has its own solver with
+    /// the present settings; where contact is declared for all pairs of bodies it joins the others and touches them.
+    /// O(tets) of the body; of all bodies if there was one or it joins them.
     ///
     /// Renderers must rebuild their skin from [`Simulation::boundary`]. On a device the positions are read back.
     ///
     /// # Errors
-    /// If a value lies outside its range, the mesh is broken, the device is lost, or contact is declared for all pairs of
-    /// bodies; nothing has changed then.
+    /// If a value lies outside its range, the mesh is broken, the device is lost, or a stroke is moving through the
+    /// bodies that it joins; nothing has changed then.
     ///
     /// # Example
     /// ```
@@ -395,11 +445,10 @@ impl Simulation {
         self.read_back()?;
         let state = &self.state;
         let number = state.scene.body.len();
-        if let Some(contact) = &state.scene.contact
-            && contact.pairs == ContactPairs::All
-        {
-            let range = "a list of pairs where bodies are added: a body that is added is solved alone and touches itself only";
-            return Err(value("contact.pairs", "all", range));
+        let contact = state.scene.contact.as_ref();
+        let touches = contact.is_some_and(|contact| contact.pairs == ContactPairs::All);
+        if touches {
+            state.timeline.check_join()?;
         }
         let field = format!("body[{number}]");
         let made = ResolvedBody::new(&field, &body.spec, Some(&body.mesh), state.solver.substeps)?;
@@ -416,15 +465,14 @@ impl Simulation {
             ..settings(&present)?
         };
         let make = || {
-            Island::new(
-                &present,
-                &state.compute_device,
-                state.precision,
-                settings,
-                joined,
-            )
+            let device = &state.compute_device;
+            let island = Island::new(&present, device, state.precision, settings, joined)?;
+            // Where all bodies touch, the others are one island.
+            let first = touches.then(|| &state.islands[0]);
+            let whole = first.map(|first| first.joined_with(&island, &present, device));
+            Ok::<_, Error>((island, whole.transpose()?))
         };
-        let island = match &self.pool {
+        let (island, whole) = match &self.pool {
             Some(pool) => pool.install(make),
             None => make(),
         }?;
@@ -439,20 +487,16 @@ impl Simulation {
         islands.push(island);
         state.scene = Arc::new(scene);
         state.residuals_kept = false;
+        if let Some(whole) = whole {
+            let added = state.islands.len() - 1;
+            state.put_joined(0, added, whole);
+        }
+        let state = &self.state;
         if !state.on_cut.is_empty() {
             let particles = self.mesh().positions.len();
             self.state.on_cut.resize(particles, false);
         }
-        if let Some(budget) = self.state.solver.budget_ms {
-            let State {
-                islands, solver, ..
-            } = &mut self.state;
-            let mut fit = || budget::fit(islands, solver, budget);
-            match &self.pool {
-                Some(pool) => pool.install(fit),
-                None => fit(),
-            }?;
-        }
+        self.fit_budget()?;
         Ok(BodyHandle(number))
     }
 
@@ -486,18 +530,19 @@ impl Simulation {
         island.ok_or_else(|| value(field, body, "the number of a body, counted from 0"))
     }
 
-    /// The number of the island of both bodies of a distance constraint.
-    fn island_of_both(&self, spec: &DistanceSpec) -> Result<usize, Error> {
-        let from = self.island_of("distance.from.body", spec.from.body)?;
-        let to = self.island_of("distance.to.body", spec.to.body)?;
-        if from != to {
-            let range = format!(
-                "a body that a distance has tied to body {} since the simulation started",
-                spec.from.body
-            );
-            return Err(value("distance.to.body", spec.to.body, range));
+    /// Adapts substeps to the time budget, if there is one.
+    fn fit_budget(&mut self) -> Result<(), Error> {
+        let State {
+            islands, solver, ..
+        } = &mut self.state;
+        let Some(budget) = solver.budget_ms else {
+            return Ok(());
+        };
+        let mut fit = || budget::fit(islands, solver, budget);
+        match &self.pool {
+            Some(pool) => pool.install(fit),
+            None => fit(),
         }
-        Ok(from)
     }
 
     /// Applies an impulse in N·s to the particles within a radius in m of a point: all of them change their velocity by

@@ -139,8 +139,8 @@ impl Simulation {
     /// ```
     pub fn grab_force(&self, grab: Grab) -> Result<Force, Error> {
         self.check_measured()?;
-        let island = self.state.islands.get(grab.island);
-        let held = island.and_then(|island| Some((island, island.grabs.held(grab)?)));
+        let mut islands = self.state.islands.iter();
+        let held = islands.find_map(|island| Some((island, island.grabs.held(grab)?)));
         let Some((island, (number, point))) = held else {
             let range = "one that was not released";
             return Err(value("grab", format!("{grab:?}"), range));
@@ -277,10 +277,7 @@ impl Simulation {
             let force = self.collider_force(handle);
             add(ForceKind::Collider, handle.number(), None, force);
         }
-        let grabs = islands
-            .iter()
-            .enumerate()
-            .flat_map(|(g, island)| island.grabs.all_held(g));
+        let grabs = islands.iter().flat_map(|island| island.grabs.all_held());
         for (index, grab) in grabs.enumerate() {
             add(ForceKind::Grab, index, None, self.grab_force(grab));
         }

@@ -153,7 +153,9 @@ impl Simulation {
         let Some((_, g, particle)) = nearest else {
             return Ok(None);
         };
-        let grab = self.state.islands[g].grab(g, particle, point, radius, compliance)?;
+        let grab = Grab(self.state.next.grab);
+        self.state.islands[g].grab(grab, particle, point, radius, compliance)?;
+        self.state.next.grab += 1;
         Ok(Some(grab))
     }
 
@@ -167,8 +169,8 @@ impl Simulation {
     /// If the grab was released, or if a coordinate is not finite or beyond 1e9 m. The grab does not move then.
     pub fn move_grab(&mut self, grab: Grab, to: DVec3) -> Result<(), Error> {
         coordinates("grab.to", to.to_array())?;
-        let island = self.state.islands.get_mut(grab.island);
-        match island.is_some_and(|island| island.move_grab(grab, to)) {
+        let mut islands = self.state.islands.iter_mut();
+        match islands.any(|island| island.move_grab(grab, to)) {
             true => Ok(()),
             false => Err(unknown(grab)),
         }
@@ -182,11 +184,12 @@ impl Simulation {
     /// # Errors
     /// If the grab was released before, or the device is lost.
     pub fn release(&mut self, grab: Grab) -> Result<(), Error> {
-        let island = self.state.islands.get_mut(grab.island);
-        match island.map_or(Ok(false), |island| island.release(grab))? {
-            true => Ok(()),
-            false => Err(unknown(grab)),
+        for island in &mut self.state.islands {
+            if island.release(grab)? {
+                return Ok(());
+            }
         }
+        Err(unknown(grab))
     }
 
     /// Sets the velocity in m/s of each free particle as a function of its position in m, and wakes all bodies.

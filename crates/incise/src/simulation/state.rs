@@ -126,6 +126,33 @@ impl Dependents<'_> {
 }
 
 impl State {
+    /// Returns islands `into` and `other`, of which `into` has the lower number, as one with present settings; changes
+    /// nothing. O(tets of both), as clusters, colors and layout are made again.
+    pub(super) fn joined(&self, into: usize, other: &Island) -> Result<Island, Error> {
+        self.timeline.check_join()?;
+        let scene = Scene {
+            solver: self.solver.clone(),
+            ..Scene::clone(&self.scene)
+        };
+        self.islands[into].joined_with(other, &scene, &self.compute_device)
+    }
+
+    /// Puts the island that two became in place of the first, and lets all numbers follow. No number that the outside
+    /// knows changes.
+    pub(super) fn put_joined(&mut self, into: usize, other: usize, joined: Island) {
+        let particles = self.islands[into].positions.len();
+        self.islands.remove(other);
+        self.islands[into] = joined;
+        self.pieces.join(into, other);
+        if let Some(merged) = &mut self.merged {
+            merged.join(into, other);
+            // Single precision has rounded them to another origin.
+            merged.collect_positions(&self.islands);
+        }
+        self.timeline.join(into, other, particles);
+        self.residuals_kept = false;
+    }
+
     /// Whether the next frame may change a mesh.
     pub(super) fn changes_meshes(&self) -> bool {
         self.timeline.is_due(self.clock.next_frame) || self.removed.iter().any(|r| !r.is_done)
@@ -180,6 +207,7 @@ impl State {
 pub(super) struct NextNumbers {
     pub(super) attachment: u32,
     pub(super) distance: u32,
+    pub(super) grab: u64,
 }
 
 impl NextNumbers {
@@ -188,6 +216,7 @@ impl NextNumbers {
         Self {
             attachment: AttachmentHandle::of_scene(scene.attachment.len()).0,
             distance: DistanceHandle::of_scene(scene.distance.len()).0,
+            grab: 0,
         }
     }
 
@@ -195,6 +224,7 @@ impl NextNumbers {
     pub(super) fn keep_numbers_of(&mut self, other: Self) {
         self.attachment = self.attachment.max(other.attachment);
         self.distance = self.distance.max(other.distance);
+        self.grab = self.grab.max(other.grab);
     }
 }
 

@@ -622,13 +622,27 @@ fn only_pairs_that_are_named_touch() {
     // The third falls through both and lies on the ground with the first.
     assert!((z[1] - z[0] - EDGE).abs() < 0.01, "{z:?}");
     assert!((z[2] - z[0]).abs() < 0.01, "{z:?}");
-    // A body that is added is solved alone; where all touch, that is refused.
+    // A body that is added is solved alone.
     simulation.add_body(cube(DVec3::X)).unwrap();
     simulation.step().unwrap();
     simulation.check().unwrap();
-    let mut all = stack(2, Precision::F32).build().unwrap();
-    let error = all.add_body(cube(DVec3::X)).unwrap_err();
-    assert_eq!(error.key().as_deref(), Some("contact.pairs"), "{error}");
+}
+
+/// Where all bodies touch, one that is added later lies on the others.
+#[test]
+fn a_body_that_is_added_lies_on_the_others() {
+    let mut simulation = stack(2, Precision::F64).build().unwrap();
+    let before = simulation.positions().len();
+    steps(&mut simulation, 5);
+    let high = dvec3(0.0, 0.0, 2.0 * EDGE + 0.05);
+    simulation.add_body(cube(high)).unwrap();
+    simulation.check().unwrap();
+    let all = simulation.positions().len();
+    steps(&mut simulation, 90);
+    simulation.check().unwrap();
+    let below = center(&simulation, before / 2..before).z;
+    let added = center(&simulation, before..all).z;
+    assert!((added - below - EDGE).abs() < 0.02, "{added} {below}");
 }
 
 /// A stack sleeps as a whole, and what falls on it wakes it.

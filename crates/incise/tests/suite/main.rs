@@ -24,6 +24,7 @@ mod gpu_live;
 mod gpu_settings;
 mod grab;
 mod interaction;
+mod joining;
 mod kappa;
 mod live;
 mod live_bodies;

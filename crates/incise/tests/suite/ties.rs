@@ -248,7 +248,7 @@ fn bad_ties_are_refused_and_nothing_changes() {
         assert!(message.contains(key), "{message}");
     }
     let mut tie = thread([0.5, 0.0, 0.0], 1.0);
-    tie.to.body = 1;
+    tie.to.body = 7;
     let message_of = |error: incise::Error| error.to_string();
     let apart = message_of(simulation.add_distance(&tie).unwrap_err());
     assert!(apart.contains("distance.to.body"), "{apart}");

@@ -96,6 +96,18 @@ impl<R: Float> Attachments<R> {
             .binary_search_by_key(&particle, |a| a.particle as usize)
     }
 
+    /// Appends other handles, and their attachments to particles from a number on.
+    pub(crate) fn append_all(&mut self, other: &Self, first_particle: u32) {
+        let first = number(self.handles.len());
+        self.handles.extend(&other.handles);
+        self.list
+            .extend(other.list.iter().map(|attachment| Attachment {
+                particle: first_particle + attachment.particle,
+                handle: first + attachment.handle,
+                ..*attachment
+            }));
+    }
+
     /// Number of handles.
     pub(crate) fn handle_count(&self) -> usize {
         self.handles.len()

@@ -15,7 +15,7 @@ use std::ops::Range;
 use glam::DVec3;
 use incise_graph::Schedule;
 
-use crate::constraints::Constraints;
+use crate::constraints::{ConstraintKind, Constraints};
 use crate::degeneracy_jitter::jitter;
 use crate::float::{finite, store};
 use crate::floating_origin::{frame_of, recenter};
@@ -112,6 +112,76 @@ impl<R: Float> Solver<R> {
                 .push(R::from_dvec3(x - origin), R::Vector::default(), false);
         }
         solver
+    }
+
+    /// Returns a solver with the particles, tets, materials and handles of this one and then those of another one, whose
+    /// numbers follow. Positions, velocities, masses and attachments are kept; single precision rounds the positions
+    /// once, since their origin is chosen again. Distances, volumes, contacts, the limit of kappa of the other one and
+    /// residuals are left out. O(both).
+    ///
+    /// # Panics
+    /// If both have more than 65,536 materials.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_xpbd::Solver;
+    ///
+    /// let mut one = Solver::<f64>::new(&[DVec3::ZERO]);
+    /// let mut other = Solver::<f64>::new(&[DVec3::X, DVec3::Y]);
+    /// one.set_mass(0, 1.0);
+    /// other.set_velocity(1, DVec3::Z);
+    /// let both = one.joined_with(&other);
+    /// assert_eq!(both.particle_count(), 3);
+    /// assert_eq!((both.position(2), both.velocity(2)), (DVec3::Y, DVec3::Z));
+    /// ```
+    #[must_use]
+    pub fn joined_with(&self, other: &Self) -> Self {
+        let (mut all, mut of_other) = (Vec::new(), Vec::new());
+        self.positions(&mut all);
+        other.positions(&mut of_other);
+        all.append(&mut of_other);
+        let (origin, size) = frame_of(&all);
+        let mut particles = Particles::new(origin, size);
+        for from in [&self.particles, &other.particles] {
+            let shift = from.origin - origin;
+            for p in 0..from.len() {
+                let x = R::from_dvec3(from.local(p) + shift);
+                let added = particles.push(x, from.velocities[p], from.fixed[p]);
+                let [a, b, c] = R::components(x);
+                particles.cells[added] = R::particle([a, b, c, from.weight(p)]);
+                particles.masses[added] = from.masses[p];
+            }
+        }
+        let mut tets = self.tets.clone();
+        let first = number(self.particles.len());
+        let first_material = u16::try_from(tets.materials.len());
+        let material = |m: &u16| {
+            let number = first_material.ok().and_then(|first| first.checked_add(*m));
+            number.expect("at most 65,536 materials")
+        };
+        tets.materials.extend(&other.tets.materials);
+        tets.material_of
+            .extend(other.tets.material_of.iter().map(material));
+        tets.rest_volumes.extend(&other.tets.rest_volumes);
+        tets.list.extend(other.tets.list.iter().map(|tet| {
+            let mut tet = *tet;
+            tet.particles = tet.particles.map(|p| first + p);
+            tet
+        }));
+        let mut constraints = Constraints::default();
+        for (from, first) in [(self, 0), (other, first)] {
+            let mut attachments = from.constraints.attachments.clone();
+            attachments.shift(R::from_dvec3(origin - from.particles.origin));
+            constraints.attachments.append_all(&attachments, first);
+        }
+        Self {
+            particles,
+            tets,
+            constraints,
+            stepper: Stepper::default(),
+            changes: None,
+        }
     }
 
     /// Returns the number of particles.
