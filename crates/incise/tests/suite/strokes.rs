@@ -312,9 +312,6 @@ fn improvement_after_strokes_keeps_everything_current() {
         };
         let (none, _, grown, pieces, volume) = run("");
         let (collapsed, merged, tets, same, kept) = run("[cutting]\nimprove = true");
-        println!(
-            "{grown} tets, improved {tets}: {collapsed} particles and {merged} tets taken out"
-        );
         assert!(none == 0 && tets <= grown);
         if contact.is_empty() {
             assert!(collapsed > 0 && merged > 0);
