@@ -667,11 +667,11 @@ impl Improvement<'_> {
                         tag,
                     });
                 }
-                if !is_deleted && !(keeps && tag.is_some()) {
-                    delta
-                        .surface_added
-                        .extend(cuttable.faces.triangle(mesh, face));
+                if is_deleted || (keeps && tag.is_some()) {
+                    continue;
                 }
+                let triangle = cuttable.faces.triangle(mesh, face);
+                delta.surface_added.extend(triangle);
             }
         }
         delta.dihedral = dihedrals.range();

@@ -182,7 +182,6 @@ fn a_plane_through_a_grid() {
         }
         assert!((1..10).contains(&calls));
         let left = patient.body.mesh().tets.len() - mesh.tets.len();
-        println!("snap {snap}: {added} tets added, {left} left after {calls} calls");
         assert!(10 * left < 6 * added);
     }
 }
@@ -227,7 +226,6 @@ fn ten_thin_slices() {
             let mesh = patient.body.mesh();
             (mesh.tets.len(), slivers(mesh), patient.pieces.count())
         });
-        println!("slices, snap {snap}: {} -> {counts:?}", mesh.tets.len());
         let [(grown, bad, count), (tets, slivers, same)] = counts;
         assert_eq!(count, same);
         assert!(4 * tets < grown);
