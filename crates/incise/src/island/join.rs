@@ -122,6 +122,7 @@ impl Island {
             spare_frames,
             distances,
             forces: None,
+            blades: Vec::new(),
             contacts,
             grabs,
             volumes,
