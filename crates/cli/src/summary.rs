@@ -49,7 +49,10 @@ impl Summary {
             self.worst_volume_ratio = self.worst_volume_ratio.min(cut.worst_volume_ratio);
         }
         self.repaired += report.repaired;
+        // Contacts are counted in the frames that are reported.
+        let contact = report.contact.or(self.last.contact);
         self.last = report.clone();
+        self.last.contact = contact;
     }
 
     /// Formats the times by stage, then the counts.

@@ -262,6 +262,9 @@ impl ContactDetector {
             self.body_of.push(self.body_of[source.index()]);
         }
         let is_deleted = |tet: TetId| delta.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
+        // Other tets take over the volume of those that an improvement deletes.
+        let mut inside = self.inside.iter();
+        self.location_is_due |= delta.collapsed > 0 && inside.any(|(_, tet)| is_deleted(*tet));
         self.inside.retain(|(_, tet)| !is_deleted(*tet));
         for (_, tet) in &mut self.inside {
             *tet = delta.slot_after(*tet);
@@ -486,6 +489,8 @@ impl ContactDetector {
 
     /// Searches for each vertex.
     fn query(&mut self, state: &ContactState<'_>) {
+        let bodies = self.room.bodies.iter();
+        let present = bodies.filter(|bounds| **bounds != Bounds::EMPTY).count();
         let Room {
             normals,
             found,
@@ -508,7 +513,7 @@ impl ContactDetector {
             mean_edge: self.mean_edge,
         };
         // A body touches itself, or its pieces each other, whichever bodies are near.
-        let touches_itself = self.settings.self_contact || state.pieces.count() > is_near.len();
+        let touches_itself = self.settings.self_contact || state.pieces.count() > present;
         let is_asked = |vertex: u32| {
             let body = self.body_of[vertex as usize] as usize;
             touches_itself || is_near[body]

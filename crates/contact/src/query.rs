@@ -42,6 +42,8 @@ const BEHIND: f64 = 1e-4;
 const OUTSIDE: usize = 3;
 /// Inner triangles that are tried for a valid way, nearest first; the vertex counts as deep after that.
 const TRIES: usize = 8;
+/// A way out that faces a vertex is taken unless it is this many times as long as another one.
+const FAR: f64 = 2.0;
 /// Tets that are looked at for a way out of a body.
 const DEEP_TETS: usize = 64;
 
@@ -491,8 +493,8 @@ impl Query<'_> {
         })
     }
 
-    /// The nearest triangle of the boundary around the tet that contains the vertex from which a way leads to it:
-    /// among those that face it, else among all.
+    /// The nearest triangle of the boundary around the tet that contains the vertex from which a way leads to it: among
+    /// those that face it, unless another one is much nearer or none does.
     fn way_out(&self, tet: TetId, vertex: &Vertex<'_>) -> Option<Near> {
         let mut seen = [TetId(0); DEEP_TETS];
         seen[0] = tet;
@@ -527,8 +529,14 @@ impl Query<'_> {
                 }
             }
         }
-        let mut ways = facing.iter().chain(others.iter());
-        ways.find(|near| self.way(near, vertex).is_some()).copied()
+        let first = |list: &Nearest<TRIES>| {
+            let mut ways = list.iter().filter(|near| self.way(near, vertex).is_some());
+            ways.next().copied()
+        };
+        match (first(&facing), first(&others)) {
+            (Some(near), Some(other)) if near.distance > FAR * other.distance => Some(other),
+            (near, other) => near.or(other),
+        }
     }
 
     /// A triangle that a deep vertex might leave by, and whether it faces it.

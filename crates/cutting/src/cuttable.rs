@@ -23,8 +23,8 @@ pub struct CuttableMesh {
     pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
     /// The mean volume of the tets that the mesh was made of, in m³.
     pub(crate) mean_volume: f64,
-    /// Number of particles that the mesh was made of.
-    pub(crate) original: usize,
+    /// The particles that the appended meshes were made of: first and end of each range, ascending.
+    pub(crate) original: Vec<[usize; 2]>,
 }
 
 impl CuttableMesh {
@@ -39,7 +39,7 @@ impl CuttableMesh {
         let mean_volume = mesh.total_volume() / mesh.tets.len().max(1) as f64;
         Ok(Self {
             mean_volume,
-            original: mesh.positions.len(),
+            original: vec![[0, mesh.positions.len()]],
             mesh,
             stars,
             faces,
@@ -81,6 +81,14 @@ impl CuttableMesh {
         self.faces.append(&other.faces);
         let bent = other.bent.iter().map(|(&p, &by)| (shifted(p), by));
         self.bent.extend(bent);
+        let original = other.original.iter().map(|range| range.map(|p| first + p));
+        self.original.extend(original);
+    }
+
+    /// Whether a particle is of a mesh as it was made, not of a cut.
+    pub(crate) fn is_original(&self, particle: ParticleId) -> bool {
+        let mut ranges = self.original.iter();
+        ranges.any(|&[first, end]| (first..end).contains(&particle.index()))
     }
 
     /// Returns the mesh at rest, with all cuts made so far.

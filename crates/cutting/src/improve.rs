@@ -83,9 +83,9 @@ impl Default for ImproveOptions {
 /// use incise_cutting::{CutOptions, CuttableMesh, ImproveOptions, Plane, cut_plane, improve};
 /// use incise_mesh::kuhn_box;
 ///
-/// let mut body = CuttableMesh::new(kuhn_box([4; 3], DVec3::ONE))?;
+/// let mut body = CuttableMesh::new(kuhn_box([5; 3], DVec3::ONE))?;
 /// let rest = body.mesh().positions.clone();
-/// let plane = Plane { point: DVec3::splat(0.52), normal: DVec3::X };
+/// let plane = Plane { point: DVec3::splat(0.43), normal: DVec3::new(1.0, 0.2, 0.1) };
 /// let cut = cut_plane(&mut body, &rest, &plane, &CutOptions { snap: 0.0, ..CutOptions::default() })?;
 /// let tets = body.mesh().tets.len();
 ///
@@ -270,7 +270,7 @@ impl Improvement<'_> {
                     let length = self.rest(particle).distance_squared(self.rest(neighbor));
                     shortest = shortest.min(length);
                 }
-                let is_created = particle.index() >= self.cuttable.original;
+                let is_created = !self.cuttable.is_original(particle);
                 if is_created && shortest.is_finite() && !is_locked(self.cuttable, particle) {
                     due.push((shortest, particle));
                 }
@@ -302,7 +302,9 @@ impl Improvement<'_> {
         is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
     ) -> Vec<ParticleId> {
         let star = Star::of(self.cuttable, particle);
+        // A change of this round may have locked it.
         if star.tets.is_empty()
+            || is_locked(self.cuttable, particle)
             || !star.is_single_fan()
             || (self.keeps_boundary && !star.fan.is_empty())
         {
@@ -342,7 +344,7 @@ impl Improvement<'_> {
             return None;
         };
         let twin = if one == star.particle { other } else { one };
-        if twin.index() < self.cuttable.original {
+        if self.cuttable.is_original(twin) {
             return None;
         }
         let twin = Star::of(self.cuttable, twin);

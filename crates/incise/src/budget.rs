@@ -1,9 +1,8 @@
 //! `solver.budget_ms`: chooses substeps and method for a time budget of a frame.
 //!
 //! Copies of the solvers run a few frames to measure the cost of a substep of Gauss-Seidel and of a frame of two-level
-//! VBD. All islands together may use [`SHARE`] of the budget, each in proportion to the cost of its accuracy. Without a
-//! The search for contacts is measured, too: it comes once a frame, whatever the substeps. Without a
-//! stated accuracy the rest buys more substeps. After cuts the cost grows with the number of tets, and substeps are
+//! VBD. All islands together may use [`SHARE`] of the budget, each in proportion to the cost of its accuracy. The
+//! search for contacts is measured, too: it comes once a frame, whatever the substeps. Without a stated accuracy the rest buys more substeps. After cuts the cost grows with the number of tets, and substeps are
 //! reduced if they no longer fit. The choice depends on measured times, so results differ from run to run. Cost: a few
 //! frames at the start.
 

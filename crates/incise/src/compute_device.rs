@@ -10,9 +10,10 @@ use std::sync::Arc;
 #[cfg(feature = "gpu")]
 use incise_gpu::{GpuContext, GpuOptions};
 
+use crate::method::check_forces;
 use crate::scene::{Backend, Method, Precision, StrokeSpec};
 use crate::validate::value;
-use crate::{Error, Scene, forces, solid_blade};
+use crate::{Error, Scene, solid_blade};
 
 /// A device that is open, if one is.
 #[derive(Clone, Debug, Default)]
@@ -118,7 +119,7 @@ impl ComputeDevice {
 /// Returns an error if the GPU path does not support a setting of the scene.
 pub(crate) fn check(scene: &Scene) -> Result<(), Error> {
     let solver = &scene.solver;
-    forces::check(&scene.report, solver.method, true)?;
+    check_forces(&scene.report, solver.method, true)?;
     if let Some(stroke) = scene.stroke.iter().position(StrokeSpec::is_solid) {
         solid_blade::check(&format!("stroke[{stroke}]"), solver.method, true)?;
     }

@@ -26,6 +26,7 @@ use crate::backend::{AnySolver, each, each_mut};
 use crate::report::{ContactCounts, milliseconds};
 use crate::scene::{ContactPairs, ContactSpec};
 use crate::validate::{existing, value, within};
+use crate::warning::{Warning, WarningCode};
 use crate::{Error, Scene};
 
 /// Bytes of a particle in a detector: its body, the head of its list of triangles, where it was when contacts were searched.
@@ -35,7 +36,7 @@ const TRIANGLE: usize = 24 + 24 + 32;
 /// Pieces that have touched do so until their gap is this part of a mean edge.
 const TOUCHING: f64 = 0.02;
 /// A contact that stays deeper than this part of a mean edge is told.
-pub(crate) const DEEP: f64 = 0.1;
+const DEEP: f64 = 0.1;
 /// For how long it has to: s, and recovery times, within which an overlap of the start has parted.
 const DEEP_TIME: f64 = 0.25;
 const RECOVERIES: f64 = 5.0;
@@ -111,6 +112,31 @@ pub(crate) struct Overlap {
     pub(crate) depth: f64,
     /// For how long contacts have been deep, in s.
     pub(crate) time: f64,
+}
+
+impl Overlap {
+    /// The warning about an overlap that does not part; `of_scene` has the numbers in the scene of each piece and of its
+    /// body.
+    pub(crate) fn warning(&self, of_scene: [(u32, usize); 2]) -> Warning {
+        let [(first, of_first), (second, of_second)] = of_scene;
+        let who = if first == second {
+            format!("piece {first} overlaps itself")
+        } else {
+            let [low, high] = [first.min(second), first.max(second)];
+            format!("pieces {low} and {high} overlap")
+        };
+        let mut bodies = vec![of_first.min(of_second), of_first.max(of_second)];
+        bodies.dedup();
+        let message = format!(
+            "{who} by {:.0}% of the mean edge, and contacts have been deeper than {:.0}% for {:.2} s: what presses is \
+             faster or stronger than contact resolves; use more substeps, press more slowly, or use larger or more equal \
+             tets where they touch",
+            100.0 * self.depth,
+            100.0 * DEEP,
+            self.time
+        );
+        Warning::new(WarningCode::ContactDepth, &bodies, message)
+    }
 }
 
 /// What of an island touches.
@@ -217,12 +243,19 @@ impl Contacts {
         other: &Self,
         first_piece: u32,
     ) -> Result<Self, Error> {
+        // Without self-contact the sides of a cut touch by the pairs of its particles only, which a new detector lacks.
+        let has_pairs = |contacts: &Self| !contacts.detector.pairs().is_empty();
+        if !spec.self_contact && (has_pairs(one) || has_pairs(other)) {
+            let range = "true where bodies with fresh cuts are joined";
+            return Err(value("contact.self_contact", false, range));
+        }
         let bodies = [one.detector.body_of(), other.detector.body_of()].concat();
         let mut joined = Self::new(spec, mesh, bodies)?;
         let shifted = |touch: &Touch| Touch {
             pieces: touch.pieces.map(|piece| first_piece + piece),
             ..*touch
         };
+        joined.deep_time = one.deep_time.max(other.deep_time);
         joined.touches.clone_from(&one.touches);
         joined.touches.extend(other.touches.iter().map(shifted));
         Ok(joined)
@@ -305,10 +338,11 @@ impl Contacts {
                 }
             };
             let (surface, positions) = (self.detector.surface(), &self.room.positions);
+            let reach = self.detector.reach();
             let mut changed = faces.len() != self.face_colors.vertex_count();
             self.faces.resize(faces.len(), NO_CONTACT);
             for (contact, out) in faces.iter().zip(&mut self.faces) {
-                let (particles, beyond) = planes(surface, positions, contact.particles);
+                let (particles, beyond) = planes(surface, positions, contact.particles, reach);
                 changed |= particles != out.particles;
                 *out = FaceContact {
                     particles,
@@ -521,6 +555,7 @@ fn planes(
     surface: &ContactSurface,
     positions: &[DVec3],
     contact: [u32; 4],
+    reach: f64,
 ) -> ([u32; 4], Option<[f64; 3]>) {
     let at = |p: u32| positions[p as usize];
     let [vertex, corners @ ..] = contact;
@@ -574,7 +609,11 @@ fn planes(
     if to_own < FACES && to_other > FACES_NOT {
         return (turned, None);
     }
-    if to_other < FACES && to_own > FACES_NOT && other != vertex {
+    let is_near = || {
+        let closest = closest_on_triangle([at(q), at(p), at(other)], at(vertex)).point;
+        closest.distance(at(vertex)) <= reach
+    };
+    if to_other < FACES && to_own > FACES_NOT && other != vertex && is_near() {
         return ([vertex, q, p, other], None);
     }
     // In the basis: the part along the area, and the rest by the normal equations of both edges.

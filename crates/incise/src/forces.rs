@@ -7,12 +7,10 @@
 use std::collections::BTreeMap;
 
 use glam::DVec3;
-use incise_mesh::ParticleId;
+use incise_cutting::CuttableMesh;
+use incise_mesh::{ParticleId, TetId};
 
-use crate::Error;
-use crate::island::Island;
-use crate::scene::{Method, Quantity, ReportSpec};
-use crate::validate::value;
+use crate::backend::AnySolver;
 
 /// The forces of a frame from the bodies of an island, with torques about the origin of the world.
 #[derive(Clone, Debug, Default)]
@@ -29,17 +27,23 @@ pub(crate) struct Measured {
 }
 
 impl Measured {
-    /// Takes over what the solver of an island has measured; `None` if it has not.
-    pub(crate) fn of(island: &Island) -> Option<Box<Self>> {
-        let forces = island.solver.backend().forces()?;
+    /// Takes over what the solver of an island has measured; `None` if it has not. `strokes` are those of the solid blades
+    /// in the order of the solver.
+    pub(crate) fn of(
+        solver: &AnySolver,
+        mesh: &CuttableMesh,
+        body_of_tet: impl Fn(TetId) -> usize,
+        strokes: impl Iterator<Item = u32>,
+    ) -> Option<Box<Self>> {
+        let forces = solver.backend().forces()?;
         let mut fixed = BTreeMap::new();
         for (p, force) in forces.fixed {
-            let mut around = island.cuttable.around(ParticleId(p));
+            let mut around = mesh.around(ParticleId(p));
             // What has lost all its tets belongs to no body.
             let Some(tet) = around.next() else { continue };
-            let x = island.solver.position(p);
+            let x = solver.position(p);
             let none = (incise_xpbd::Force::default(), DVec3::ZERO, 0.0);
-            let (sum, center, count) = fixed.entry(island.body_of_tet(tet)).or_insert(none);
+            let (sum, center, count) = fixed.entry(body_of_tet(tet)).or_insert(none);
             sum.force += force;
             sum.torque += x.cross(force);
             *center += x;
@@ -49,10 +53,7 @@ impl Measured {
         Some(Box::new(Self {
             handles: forces.handles.into_iter().map(Some).collect(),
             colliders: forces.colliders,
-            blades: {
-                let strokes = island.blades.iter().map(|(stroke, _)| *stroke);
-                strokes.zip(forces.blades).collect()
-            },
+            blades: strokes.zip(forces.blades).collect(),
             fixed: fixed
                 .map(|(body, (sum, center, count))| (body, (sum, center / count)))
                 .collect(),
@@ -70,19 +71,4 @@ impl Measured {
             *force = None;
         }
     }
-}
-
-/// Refuses forces where the method or the device has none.
-pub(crate) fn check(report: &ReportSpec, method: Method, is_gpu: bool) -> Result<(), Error> {
-    if !report.quantities.contains(&Quantity::Force) {
-        return Ok(());
-    }
-    let range = if is_gpu {
-        "without `force` on a GPU"
-    } else if method == Method::Chebyshev {
-        "without `force` for method chebyshev, whose extrapolation moves particles by no force"
-    } else {
-        return Ok(());
-    };
-    Err(value("report.quantities", "with `force`", range))
 }

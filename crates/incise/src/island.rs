@@ -511,16 +511,22 @@ impl Island {
             self.set_blades(blades.collect())?;
         }
         let step = if self.contacts.is_some() {
-            self.step_with_contact(keeping_residuals)?
+            self.step_with_contact(keeping_residuals)
         } else {
             let (schedule, settings) = (&self.partition.schedule, &self.settings);
             let backend = self.solver.backend_mut();
-            backend.step(schedule, settings, keeping_residuals)?
+            backend.step(schedule, settings, keeping_residuals)
         };
-        self.forces = measuring_forces.then(|| Measured::of(self)).flatten();
+        // Also after an error: no blade may stay behind.
         if !self.blades.is_empty() {
             self.set_blades(Vec::new())?;
         }
+        let step = step?;
+        let strokes = self.blades.iter().map(|(stroke, _)| *stroke);
+        let body_of_tet = |tet| self.body_of_tet(tet);
+        let measured = measuring_forces
+            .then(|| Measured::of(&self.solver, &self.cuttable, body_of_tet, strokes));
+        self.forces = measured.flatten();
         self.judge_step();
         collider::advance(&mut self.settings);
         self.grabs.arrive();
@@ -669,15 +675,12 @@ impl Island {
     pub(crate) fn particles_of(&self, body: usize) -> (Vec<usize>, Vec<DVec3>) {
         let mesh = self.cuttable.mesh();
         let all = 0..mesh.positions.len();
-        let numbers: Vec<usize> = if self.bodies.len() == 1 {
-            all.collect()
-        } else {
-            let is_of = |p: &usize| {
-                let tet = self.cuttable.around(ParticleId::new(*p)).next();
-                tet.is_some_and(|tet| self.body_of_tet(tet) == body)
-            };
-            all.filter(is_of).collect()
+        // A particle that has lost all its tets is of no body.
+        let is_of = |p: &usize| {
+            let tet = self.cuttable.around(ParticleId::new(*p)).next();
+            tet.is_some_and(|tet| self.bodies.len() == 1 || self.body_of_tet(tet) == body)
         };
+        let numbers: Vec<usize> = all.filter(is_of).collect();
         let positions = numbers.iter().map(|&p| mesh.positions[p]).collect();
         (numbers, positions)
     }

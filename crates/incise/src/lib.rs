@@ -25,6 +25,7 @@ mod accuracy;
 pub mod advise;
 mod attachment;
 mod backend;
+mod blade_sides;
 mod budget;
 mod collider;
 mod compute_device;

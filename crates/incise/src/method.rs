@@ -9,10 +9,12 @@
 use incise_xpbd::{StepSettings, VbdSettings};
 
 use crate::accuracy::DEFAULT_ACCURACY;
-use crate::scene::{Integrator, Method, SolverSpec, StrokeSpec, Substeps, TetSolve};
+use crate::scene::{
+    Integrator, Method, Quantity, ReportSpec, SolverSpec, StrokeSpec, Substeps, TetSolve,
+};
 use crate::substeps::{Choice, Shortfall};
 use crate::validate::{coordinates, value, within};
-use crate::{Error, Scene, collider, forces, solid_blade};
+use crate::{Error, Scene, collider, solid_blade};
 
 /// Rounds of two-level VBD in a frame, at most: what has not converged then is reported.
 const MOST_ROUNDS: u32 = 20;
@@ -74,7 +76,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         field: "solver".into(),
         source,
     })?;
-    forces::check(&scene.report, solver.method, false)?;
+    check_forces(&scene.report, solver.method, false)?;
     if let Some(stroke) = scene.stroke.iter().position(StrokeSpec::is_solid) {
         solid_blade::check(&format!("stroke[{stroke}]"), solver.method, false)?;
     }
@@ -179,4 +181,19 @@ pub(crate) fn check_vbd(scene: &Scene) -> Result<(), Error> {
 /// An error about a value that VBD does not know.
 pub(crate) fn refused(field: &str, given: impl ToString, range: &str) -> Error {
     value(field, given, format!("{range} solver.method is \"vbd\""))
+}
+
+/// Refuses forces where the method or the device has none.
+pub(crate) fn check_forces(report: &ReportSpec, method: Method, is_gpu: bool) -> Result<(), Error> {
+    if !report.quantities.contains(&Quantity::Force) {
+        return Ok(());
+    }
+    let range = if is_gpu {
+        "without `force` on a GPU"
+    } else if method == Method::Chebyshev {
+        "without `force` for method chebyshev, whose extrapolation moves particles by no force"
+    } else {
+        return Ok(());
+    };
+    Err(value("report.quantities", "with `force`", range))
 }

@@ -249,7 +249,11 @@ impl Simulation {
         if stroke.is_solid() {
             self.check_solid()?;
         }
-        self.state.timeline.add(&stroke)
+        self.state.timeline.add(&stroke)?;
+        if stroke.is_solid() {
+            self.keep_off_vbd();
+        }
+        Ok(())
     }
 
     /// Advances by one frame and reports on it.
@@ -383,7 +387,7 @@ impl Simulation {
             }
             if let Some(overlap) = contacts.take_overlap() {
                 let of_scene = overlap.pieces.map(|piece| pieces.of_scene(number, piece));
-                let warning = Warning::of_contact_depth(&overlap, of_scene);
+                let warning = overlap.warning(of_scene);
                 island.warnings.push(warning);
             }
         }

@@ -164,6 +164,15 @@ impl Timeline {
         &self.solids
     }
 
+    /// Notes that the solid blade of a stroke touches what it has cut.
+    pub(crate) fn note_touch(&mut self, stroke: u32) {
+        let mut strokes = self.strokes.iter_mut();
+        let touching = strokes.find(|other| other.options.tag == stroke);
+        if let Some(solid) = touching.and_then(|stroke| stroke.solid.as_mut()) {
+            solid.note_touch();
+        }
+    }
+
     /// Sets the blade of a live stroke for the start of the next frame.
     pub(crate) fn move_blade(&mut self, stroke: u32, pose: &[DVec3]) -> Result<(), Error> {
         let (_, field, blade) = self.live(stroke)?;
@@ -252,6 +261,13 @@ impl Timeline {
 
     /// Notes that island `other` was appended to island `into`, which had so many particles.
     pub(crate) fn join(&mut self, into: usize, other: usize, particles: usize) {
+        if other < self.created.len() {
+            let of_other = self.created.remove(other);
+            let shifted = of_other
+                .iter()
+                .map(|p| ParticleId::new(particles + p.index()));
+            self.created[into].extend(shifted);
+        }
         if other < self.registries.len() {
             let of_other = self.registries.remove(other);
             self.registries[into].append(&of_other, particles);

@@ -11,7 +11,6 @@ use incise_mesh::Bounds;
 use serde::Serialize;
 
 use crate::accuracy::DEFAULT_ACCURACY;
-use crate::contacts::{DEEP, Overlap};
 use crate::scene::SolverSpec;
 use crate::substeps::{Choice, Shortfall};
 use crate::tool::{MissedStroke, Reach};
@@ -121,29 +120,6 @@ impl Warning {
             message: format!("the stroke met no tet: {blade}; {body}"),
             location: field,
         }
-    }
-
-    /// The warning about an overlap that does not part; `of_scene` has the numbers in the scene of each piece and of its
-    /// body.
-    pub(crate) fn of_contact_depth(overlap: &Overlap, of_scene: [(u32, usize); 2]) -> Self {
-        let [(first, of_first), (second, of_second)] = of_scene;
-        let who = if first == second {
-            format!("piece {first} overlaps itself")
-        } else {
-            let [low, high] = [first.min(second), first.max(second)];
-            format!("pieces {low} and {high} overlap")
-        };
-        let mut bodies = vec![of_first.min(of_second), of_first.max(of_second)];
-        bodies.dedup();
-        let message = format!(
-            "{who} by {:.0}% of the mean edge, and contacts have been deeper than {:.0}% for {:.2} s: what presses is \
-             faster or stronger than contact resolves; use more substeps, press more slowly, or use larger or more equal \
-             tets where they touch",
-            100.0 * overlap.depth,
-            100.0 * DEEP,
-            overlap.time
-        );
-        Self::new(WarningCode::ContactDepth, &bodies, message)
     }
 
     /// Whether the frame cannot be trusted: the code is [`WarningCode::Diverged`] or [`WarningCode::Repaired`].

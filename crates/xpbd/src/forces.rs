@@ -21,50 +21,11 @@
 use glam::DVec3;
 
 use crate::constraints::Constraints;
+use crate::force::Force;
 use crate::particles::{Particles, number};
-use crate::{Float, Solver, StepSettings};
+use crate::{Float, StepSettings};
 
-/// A force and its torque about the origin of the world.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Force {
-    /// The force in N.
-    pub force: DVec3,
-    /// The torque about the origin of the world in N·m.
-    pub torque: DVec3,
-}
-
-impl Force {
-    /// Returns the torque about another point in N·m.
-    ///
-    /// ```
-    /// use glam::DVec3;
-    /// use incise_xpbd::Force;
-    ///
-    /// // 2 N upwards at x = 3 m turn nothing about that point.
-    /// let force = Force { force: DVec3::Z * 2.0, torque: DVec3::Y * -6.0 };
-    /// assert_eq!(force.torque_about(DVec3::X * 3.0), DVec3::ZERO);
-    /// ```
-    #[must_use]
-    pub fn torque_about(&self, point: DVec3) -> DVec3 {
-        self.torque - point.cross(self.force)
-    }
-
-    /// Adds a force that acts at a point.
-    pub(crate) fn add(&mut self, force: DVec3, at: DVec3) {
-        self.force += force;
-        self.torque += at.cross(force);
-    }
-
-    fn scaled(&self, factor: f64) -> Self {
-        Self {
-            force: self.force * factor,
-            torque: self.torque * factor,
-        }
-    }
-}
-
-/// The mean forces of a frame, from the bodies on what holds them. See [`Solver::measure_forces`].
+/// The mean forces of a frame, from the bodies on what holds them. See [`crate::Solver::measure_forces`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Forces {
     /// On each handle, by number.
@@ -103,6 +64,11 @@ pub(crate) struct ForceMeter {
 }
 
 impl ForceMeter {
+    /// Whether a frame has been measured.
+    pub(crate) fn has_frame(&self) -> bool {
+        self.frame_time > 0.0
+    }
+
     /// Begins a frame: finds the particles that are held.
     pub(crate) fn start<R: Float>(
         &mut self,
@@ -229,7 +195,7 @@ impl ForceMeter {
     }
 
     /// The mean forces of the frame.
-    fn forces(&self) -> Forces {
+    pub(crate) fn forces(&self) -> Forces {
         let per_time = 1.0 / self.frame_time;
         let mean = |impulses: &[Force]| impulses.iter().map(|i| i.scaled(per_time)).collect();
         let fixed = self.held.iter().filter(|held| held.handle.is_none());
@@ -241,49 +207,5 @@ impl ForceMeter {
                 .map(|held| (held.particle, held.impulse * per_time))
                 .collect(),
         }
-    }
-}
-
-impl<R: Float> Solver<R> {
-    /// Measures forces in the frames to come, or ends that. A measured frame has the bits of any other. A solver that
-    /// does not measure has neither memory nor a pass for it. A clone does not measure.
-    ///
-    /// # Example
-    /// A particle of 2 kg hangs from a handle.
-    /// ```
-    /// use glam::{DVec3, dvec3};
-    /// use incise_graph::Schedule;
-    /// use incise_xpbd::{Pose, Solver, StepSettings};
-    ///
-    /// let mut solver = Solver::<f64>::new(&[DVec3::ZERO]);
-    /// solver.set_mass(0, 2.0);
-    /// let handle = solver.add_handle(Pose::at(DVec3::ZERO));
-    /// solver.attach(0, handle, 0.0, 0.0)?;
-    /// solver.measure_forces(true);
-    /// let gravity = Some(dvec3(0.0, 0.0, -9.81));
-    /// solver.step(&Schedule::default(), &StepSettings { gravity, ..StepSettings::new(0.016) })?;
-    /// let forces = solver.forces().expect("they are measured");
-    /// assert!((forces.handles[0].force.z + 2.0 * 9.81).abs() < 1e-12);
-    /// # Ok::<(), incise_xpbd::XpbdError>(())
-    /// ```
-    pub fn measure_forces(&mut self, measuring: bool) {
-        if !measuring {
-            self.stepper.meter = None;
-        } else if self.stepper.meter.is_none() {
-            self.stepper.meter = Some(Box::default());
-        }
-    }
-
-    /// Returns the mean forces of the last frame, from the bodies on handles, colliders and fixed particles; `None`
-    /// unless [`Solver::measure_forces`] was on and a frame has been made since. In a frame of several parts they are
-    /// complete after the last part. O(handles + colliders + fixed particles).
-    ///
-    /// With XPBD the sum of all of them, together with those of contacts, is exactly what changes the momentum of the
-    /// bodies beside gravity. With VBD it is so up to the residual of its substeps. Chebyshev's extrapolation moves
-    /// particles by no force; its frames are refused while forces are measured.
-    #[must_use]
-    pub fn forces(&self) -> Option<Forces> {
-        let meter = self.stepper.meter.as_ref()?;
-        (meter.frame_time > 0.0).then(|| meter.forces())
     }
 }

@@ -49,6 +49,7 @@ mod direction;
 mod error;
 mod float;
 mod floating_origin;
+mod force;
 mod forces;
 mod gauss_seidel;
 mod jacobi;
@@ -81,7 +82,8 @@ pub use error::XpbdError;
 pub use float::Float;
 #[doc(hidden)]
 pub use float::Saved;
-pub use forces::{Force, Forces};
+pub use force::Force;
+pub use forces::Forces;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use pose::Pose;

@@ -89,7 +89,7 @@ fn a_continued_run_writes_all_files() {
     let mut other = arguments(out.clone(), None);
     other.quick = false;
     let refused = squares(&measured).run(&other).unwrap_err();
-    assert!(refused.to_string().contains("give another --out"));
+    assert!(refused.to_string().contains("choose another --out"));
     fs::remove_dir_all(out).unwrap();
 }
 

@@ -43,6 +43,9 @@ const STEPS: usize = 300;
 /// Steps of a search that saves a full coloring, where more colors are allowed: tens of steps are mostly enough.
 const LAST_SEARCH: usize = 1000;
 
+/// Steps of all searches in an edit.
+const ALL_STEPS: usize = 5000;
+
 /// Statistics of an edit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[non_exhaustive]
@@ -510,9 +513,10 @@ impl Recoloring {
         let (accepted, limit) = (self.accepted(), self.limit());
         if color.index() >= accepted {
             let steps = SEARCH.min(STEPS.saturating_sub(report.steps));
+            let last = LAST_SEARCH.min(ALL_STEPS.saturating_sub(report.steps));
             if self.displace(v, accepted, report)
                 || self.search(v, accepted, steps, report)
-                || color.index() >= limit && self.search(v, limit, LAST_SEARCH, report)
+                || color.index() >= limit && self.search(v, limit, last, report)
             {
                 return;
             }
@@ -594,8 +598,9 @@ impl Recoloring {
             tried = i + 1;
             self.taken.give_back(self.links.of(v), color);
             self.set(v, UNCOLORED);
+            let last = LAST_SEARCH.min(ALL_STEPS.saturating_sub(report.steps));
             let found = self.search(v, accepted, SEARCH.min(steps), report)
-                || color.index() >= limit && self.search(v, limit, LAST_SEARCH, report);
+                || color.index() >= limit && self.search(v, limit, last, report);
             if !found {
                 self.set(v, color);
             }

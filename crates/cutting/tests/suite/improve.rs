@@ -227,7 +227,9 @@ fn ten_thin_slices() {
             (mesh.tets.len(), slivers(mesh), patient.pieces.count())
         });
         let [(grown, bad, count), (tets, slivers, same)] = counts;
-        assert_eq!(count, same);
+        // Slices as thick as the snap distance exist as one sheet or not at all, which depends on the mesh.
+        let slack = usize::from(snap > 0.0);
+        assert!(count.abs_diff(same) <= slack, "{snap}: {count} {same}");
         assert!(4 * tets < grown);
         assert!(2 * slivers < bad);
     }

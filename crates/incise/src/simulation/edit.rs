@@ -23,7 +23,7 @@ use crate::ray::{RayHit, first_hit};
 use crate::resolved_body::ResolvedBody;
 use crate::scene::{AttachmentSpec, ColliderSpec, ContactPairs, ContactSpec, DistanceSpec};
 use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
-use crate::{Error, Scene, budget, contacts};
+use crate::{Error, budget, contacts};
 
 impl Simulation {
     /// Sets the acceleration of gravity in m/s² from the next frame on; `None` is no gravity. Wakes all bodies.
@@ -370,7 +370,9 @@ impl Simulation {
             }?;
             add(&mut joined)?;
             self.state.put_joined(into, other, joined);
+            self.state.next.distance += 1;
             self.fit_budget()?;
+            return Ok(name);
         }
         self.state.next.distance += 1;
         Ok(name)
@@ -455,10 +457,7 @@ impl Simulation {
         let joined = IslandBuilder::of_one(number, made)?;
         let mut scene = (*state.scene).clone();
         scene.body.push(body.spec);
-        let present = Scene {
-            solver: state.solver.clone(),
-            ..scene.clone()
-        };
+        let present = state.present(scene.clone());
         let settings = StepSettings {
             gravity: state.gravity,
             colliders: state.islands[0].settings.colliders.clone(),

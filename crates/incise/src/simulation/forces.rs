@@ -165,6 +165,11 @@ impl Simulation {
             let range = "the number of a stroke whose blade was solid in the last frame";
             return Err(value("stroke", stroke, range));
         };
+        let mut islands = self.state.islands.iter();
+        if islands.any(|island| island.forces.is_none() && !island.cuttable.mesh().tets.is_empty())
+        {
+            return Err(too_new("stroke", stroke));
+        }
         let mut sum = incise_xpbd::Force::default();
         let measured = self.state.islands.iter().filter_map(|i| i.forces.as_ref());
         for force in measured.filter_map(|measured| measured.blades.get(&stroke)) {

@@ -71,7 +71,9 @@ impl Simulation {
         solid: &SolidBladeSpec,
     ) -> Result<u32, Error> {
         self.check_solid()?;
-        self.state.timeline.begin(blade, snap, Some(solid))
+        let stroke = self.state.timeline.begin(blade, snap, Some(solid))?;
+        self.keep_off_vbd();
+        Ok(stroke)
     }
 
     /// Refuses solid blades where a body or the device knows none.
@@ -79,6 +81,13 @@ impl Simulation {
         let is_gpu = self.state.compute_device.is_gpu();
         let mut islands = self.state.islands.iter();
         islands.try_for_each(|island| solid_blade::check("stroke", island.spec.method, is_gpu))
+    }
+
+    /// Keeps `auto` from choosing VBD, which has no solid blades.
+    pub(super) fn keep_off_vbd(&mut self) {
+        for island in &mut self.state.islands {
+            island.leaves_method_open = false;
+        }
     }
 
     /// Sets the blade of a stroke for the start of the next frame. Of several calls before a frame the last one counts.

@@ -106,12 +106,15 @@ impl Simulation {
             return Err(value("solver.precision", solver.precision.name(), range));
         }
         // Strokes are under way. Some methods and devices do not have every quantity of a report.
-        let scene = Scene {
+        let mut scene = Scene {
             solver: solver.clone(),
             stroke: Vec::new(),
             report: self.state.reporting.clone(),
             ..(*self.state.scene).clone()
         };
+        if solver.method == Method::Auto && self.state.timeline.solid_field().is_some() {
+            scene.solver.method = Method::GaussSeidel;
+        }
         let settings = settings(&scene)?;
         crate::scene::check(&scene)?;
         let compute_device = self.compute_device_for(&scene)?;

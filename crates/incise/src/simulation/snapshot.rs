@@ -17,11 +17,12 @@ use super::state::State;
 use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::island::Island;
 use crate::merged_mesh::MergedMesh;
+use crate::method::check_forces;
 use crate::recluster::Recluster;
 use crate::report::FrameReport;
 use crate::scene::{Quantity, ReportSpec};
 use crate::validate::value;
-use crate::{Error, Scene, forces};
+use crate::{Error, Scene};
 
 /// A copy of the state of a simulation, to undo, fork or save: see [`Simulation::snapshot`].
 #[derive(Clone, Debug)]
@@ -165,7 +166,7 @@ impl Simulation {
     ///
     /// Everything is restored: bodies, colliders, the settings of [`Simulation::set_solver`] and
     /// [`Simulation::set_report`], and the number of the next frame. Strokes added later are gone; handles of grabs and
-    /// strokes begun later are invalid, and their numbers may be reused. To keep the present solver settings, pass a
+    /// strokes begun later are invalid, and numbers of strokes may be reused. To keep the present solver settings, pass a
     /// copy of [`Simulation::solver_spec`] to `set_solver` afterwards. [`Simulation::deltas`] is empty: renderers and
     /// recorders must rebuild from [`Simulation::boundary`], and buffers of device solvers change. With a snapshot of
     /// another simulation, this one continues that one. O(particles + tets).
@@ -223,11 +224,11 @@ impl Simulation {
         let mut state = snapshot.0.clone();
         // Every other choice leaves a note.
         if !state.compute_device.is_gpu() && state.compute_device.note.is_none() {
-            let scene = Scene {
-                solver: state.solver.clone(),
-                ..Scene::clone(&state.scene)
-            };
-            state.compute_device = ComputeDevice::choose(&scene, &OpenDevice::default())?;
+            // The body of a blade is on the CPU.
+            if state.timeline.solid_field().is_none() {
+                let scene = state.present(Scene::clone(&state.scene));
+                state.compute_device = ComputeDevice::choose(&scene, &OpenDevice::default())?;
+            }
         }
         #[cfg(feature = "gpu")]
         if let Some(gpu) = state.compute_device.gpu.clone() {
@@ -258,7 +259,7 @@ impl Simulation {
             return Err(value("report.every", 0, "at least 1"));
         }
         let is_gpu = self.state.compute_device.is_gpu();
-        forces::check(&report, self.state.solver.method, is_gpu)?;
+        check_forces(&report, self.state.solver.method, is_gpu)?;
         let asks = |report: &ReportSpec| report.quantities.contains(&Quantity::Force);
         if asks(&report) && !asks(&self.state.reporting) {
             self.state.islands.iter_mut().for_each(Island::wake);

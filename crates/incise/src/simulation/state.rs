@@ -10,6 +10,7 @@ use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 
 use crate::attachment::AttachmentHandle;
+use crate::blade_sides::touching;
 use crate::collider::Colliders;
 use crate::compute_device::ComputeDevice;
 use crate::distance::DistanceHandle;
@@ -17,8 +18,7 @@ use crate::island::Island;
 use crate::merged_mesh::MergedMesh;
 use crate::pieces::PieceNumbers;
 use crate::report::{CutReport, DetachedReport, FrameReport, Milliseconds, milliseconds};
-use crate::scene::{Precision, ReportSpec, SolverSpec};
-use crate::solid_blade::touching;
+use crate::scene::{Method, Precision, ReportSpec, SolverSpec};
 use crate::strokes::Timeline;
 use crate::{Error, Scene};
 
@@ -130,11 +130,23 @@ impl State {
     /// nothing. O(tets of both), as clusters, colors and layout are made again.
     pub(super) fn joined(&self, into: usize, other: &Island) -> Result<Island, Error> {
         self.timeline.check_join()?;
-        let scene = Scene {
-            solver: self.solver.clone(),
-            ..Scene::clone(&self.scene)
-        };
+        let scene = self.present(Scene::clone(&self.scene));
         self.islands[into].joined_with(other, &scene, &self.compute_device)
+    }
+
+    /// A scene with the settings of the present: solver and reports as they are now, no strokes of the start. While a solid
+    /// blade is on its way, `auto` does not choose VBD.
+    pub(super) fn present(&self, scene: Scene) -> Scene {
+        let mut solver = self.solver.clone();
+        if solver.method == Method::Auto && self.timeline.solid_field().is_some() {
+            solver.method = Method::GaussSeidel;
+        }
+        Scene {
+            solver,
+            report: self.reporting.clone(),
+            stroke: Vec::new(),
+            ..scene
+        }
     }
 
     /// Puts the island that two became in place of the first, and lets all numbers follow. No number that the outside
@@ -151,6 +163,7 @@ impl State {
         }
         self.timeline.join(into, other, particles);
         self.residuals_kept = false;
+        self.forces_measured = false;
     }
 
     /// Whether the next frame may change a mesh.
@@ -195,7 +208,15 @@ impl State {
             dependents.apply_delta(number, island, delta, cut, ms)
         })?;
         for island in islands {
+            let had_blades = !island.blades.is_empty();
             island.blades = touching(island, timeline.solids());
+            // What a blade has held apart closes.
+            if had_blades && island.blades.is_empty() {
+                island.wake();
+            }
+            for (stroke, _) in &island.blades {
+                timeline.note_touch(*stroke);
+            }
         }
         Ok(())
     }

@@ -15,7 +15,7 @@ use glam::DVec3;
 use super::ConstraintKind;
 use crate::direction::direction;
 use crate::float::{finite, load, store, weight};
-use crate::forces::Force;
+use crate::force::Force;
 use crate::particles::Particles;
 use crate::substep::Substep;
 use crate::{Float, XpbdError};

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use super::ConstraintKind;
 use crate::collider::{Nearest, Solid};
 use crate::float::{finite, load, store, weight};
-use crate::forces::Force;
+use crate::force::Force;
 use crate::particles::{PARALLEL_PARTICLES, Particles};
 use crate::substep::Substep;
 use crate::{Collider, Float, StepSettings};

@@ -87,7 +87,8 @@ pub struct ContactState {
     pub vertex: u32,
     /// The first corner of the triangle, or the first particle of a pair.
     pub against: u32,
-    /// How far the vertex is on the wrong side in m; negative if the two are apart.
+    /// How far the vertex is on the wrong side in m; negative if the two are apart, not above 0 if the vertex lies beside
+    /// the triangle.
     pub depth: f64,
     /// The normal force in N, summed up over the substeps since the contacts were set and divided by those of the frame:
     /// the mean of a frame, or in a frame of several parts the share of the last part. 0 if the contact did not press.
@@ -171,6 +172,8 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
     /// triangle has no normal.
     fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
+    /// Whether the first particle is above or below the other side, not beside it.
+    fn faces(&self, x: [R::Vector; K]) -> bool;
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -244,6 +247,10 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
             shares: [-R::ONE, R::ONE],
         })
     }
+
+    fn faces(&self, _x: [R::Vector; 2]) -> bool {
+        true
+    }
 }
 
 impl<R: Float> Contact<R, 4> for Face<R> {
@@ -296,6 +303,19 @@ impl<R: Float> Contact<R, 4> for Face<R> {
             };
         }
         Some(gap)
+    }
+
+    fn faces(&self, x: [R::Vector; 4]) -> bool {
+        let (e1, e2, r) = (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
+        let Some((size, normal)) = direction::<R>(R::cross(e1, e2)) else {
+            return false;
+        };
+        let second = R::dot(R::cross(r, e2), normal) / size;
+        let third = R::dot(R::cross(e1, r), normal) / size;
+        let weights = [R::ONE - second - third, second, third];
+        // The grown triangle serves the force, not the measure.
+        let rounding = R::from_f64(-1e-6);
+        weights.iter().all(|weight| *weight >= rounding)
     }
 }
 
@@ -593,7 +613,11 @@ impl<R: Float> Contacts<R> {
     ) -> ContactState {
         let x = contact.particles().map(|p| particles.vector(p as usize));
         let gap = contact.gap(x, x, R::ZERO);
-        let depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
+        let mut depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
+        // Below the plane of a triangle but beside the triangle, a vertex is not inside.
+        if !contact.faces(x) {
+            depth = depth.min(0.0);
+        }
         let [x, y, z, normal] = self
             .impulses
             .get(index)

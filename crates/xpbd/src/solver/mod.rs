@@ -9,6 +9,7 @@
 //! first step of a clone rebuilds the layout, O(tets).
 
 mod constraints;
+mod forces;
 
 use std::ops::Range;
 
