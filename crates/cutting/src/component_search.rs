@@ -37,7 +37,7 @@ pub(crate) struct Parts {
     /// Where in `tets` each part ends.
     ends: Vec<usize>,
     /// How often the tets around a particle were looked at, a tet at a time.
-    pub(crate) looks: usize,
+    pub(crate) visited_tets: usize,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -77,8 +77,8 @@ impl Parts {
         self.search_of.resize(cuttable.mesh().positions.len(), NONE);
         let mut going: Vec<u32> = seeds.iter().map(|&seed| self.start(seed)).collect();
         let mut ended: Vec<u32> = Vec::new();
-        let most = self.looks + cuttable.mesh().tets.len() / 4;
-        while going.len() > 1 && self.looks <= most {
+        let most = self.visited_tets + cuttable.mesh().tets.len() / 4;
+        while going.len() > 1 && self.visited_tets <= most {
             for &search in &going {
                 // Others may have become one with it in this round.
                 if self.searches[search as usize].parent == search {
@@ -157,7 +157,7 @@ impl Parts {
         self.searches[search as usize].open = List { first: then, last };
         self.searches[search as usize].done = self.joined(done, List::of(next));
         for tet in cuttable.around(particle) {
-            self.looks += 1;
+            self.visited_tets += 1;
             for corner in cuttable.mesh().tets[tet.index()] {
                 match self.search_of[corner.index()] {
                     NONE => self.find_particle(search, corner),
@@ -212,7 +212,7 @@ impl Parts {
         while next != NONE {
             let found = self.found[next as usize];
             for tet in cuttable.around(found.particle) {
-                self.looks += 1;
+                self.visited_tets += 1;
                 let corners = cuttable.mesh().tets[tet.index()];
                 if corners.iter().all(|&corner| found.particle <= corner) {
                     self.tets.push(tet);
@@ -241,22 +241,22 @@ impl Parts {
             .max_by_key(|&part| (sizes[part], Reverse(part)));
         parts.retain(|&part| Some(part) != largest);
         // Where the next tet of each part goes.
-        let mut place = vec![usize::MAX; pieces.count];
+        let mut slot = vec![usize::MAX; pieces.count];
         let mut end = 0;
         for part in parts {
-            place[part] = end;
+            slot[part] = end;
             end += sizes[part];
             self.ends.push(end);
         }
         self.tets.resize(end, TetId(0));
         for (&label, tet) in pieces.labels.iter().zip((0..).map(TetId)) {
-            let place = &mut place[label as usize];
-            if *place != usize::MAX {
-                self.tets[*place] = tet;
-                *place += 1;
+            let slot = &mut slot[label as usize];
+            if *slot != usize::MAX {
+                self.tets[*slot] = tet;
+                *slot += 1;
             }
         }
-        self.looks += pieces.labels.len();
+        self.visited_tets += pieces.labels.len();
     }
 
     /// Takes the largest part off the list of those that came off.

@@ -55,9 +55,9 @@ pub enum CutError {
         /// The value given.
         value: f64,
     },
-    /// Guard on the volume of children outside its range.
+    /// Limit of the volume of children outside its range.
     #[error("min_volume_ratio is {value}: it must lie between 0 and 0.015")]
-    Guard {
+    VolumeLimit {
         /// The value given.
         value: f64,
     },

@@ -68,7 +68,7 @@ impl CutOptions {
     /// Checks the ranges of the values.
     ///
     /// # Errors
-    /// [`CutError::Snap`], [`CutError::Tolerance`], [`CutError::Guard`] or [`CutError::Crumbs`] if one lies outside its range.
+    /// [`CutError::Snap`], [`CutError::Tolerance`], [`CutError::VolumeLimit`] or [`CutError::Crumbs`] if one lies outside its range.
     pub fn check(&self) -> Result<(), CutError> {
         if !(0.0..=0.25).contains(&self.snap) {
             return Err(CutError::Snap { value: self.snap });
@@ -79,7 +79,7 @@ impl CutOptions {
             });
         }
         if !(0.0..=0.015).contains(&self.min_volume_ratio) {
-            return Err(CutError::Guard {
+            return Err(CutError::VolumeLimit {
                 value: self.min_volume_ratio,
             });
         }

@@ -7,7 +7,7 @@
 //!
 //! Cost: [`PieceTracker::new`] a pass over the tets. [`PieceTracker::apply_delta`] what the cut touched, the way around the
 //! front of a slit, and a few times the parts that come off, at most about three such passes. Memory: 4 bytes a tet and
-//! a particle. Measured on grids of 10,000, 80,000 and 660,000 tets, as tets looked at ([`PieceTracker::looks`]): 54 a
+//! a particle. Measured on grids of 10,000, 80,000 and 660,000 tets, as tets looked at ([`PieceTracker::visited_tets`]): 54 a
 //! frame for a slit four cells wide, whatever the grid; 6,000 for a corner of 426 tets; 220, 430 and 860 a frame for a
 //! blade as wide as the grid while it goes down, and all of the grid when it comes out below.
 //!
@@ -202,7 +202,7 @@ impl PieceTracker {
             delta.tets_after(),
             "the mesh is as the delta left it"
         );
-        self.parts.looks = 0;
+        self.parts.visited_tets = 0;
         let reduced = self.renumber(cuttable, delta);
         let mut events = Vec::new();
         if delta.collapsed > 0 {
@@ -355,8 +355,8 @@ impl PieceTracker {
     /// Returns the number of tets that the last [`PieceTracker::apply_delta`] visited, a measure of its cost. A search
     /// visits a tet once for each of its corners, and twice if it was detached; a count visits each tet once.
     #[must_use]
-    pub fn looks(&self) -> usize {
-        self.parts.looks
+    pub fn visited_tets(&self) -> usize {
+        self.parts.visited_tets
     }
 
     /// Recounts all pieces and compares: partition, numbers of tets, and volumes to 1e-12 of each (and to 1e-15 of the

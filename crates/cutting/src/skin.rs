@@ -71,8 +71,8 @@ pub struct Skin {
     /// For each triangle its face.
     faces: Vec<(TetId, u8)>,
     /// Never iterated: their order is that of a hash.
-    place_of_face: HashMap<(TetId, u8), u32>,
-    place_of_vertex: HashMap<SkinVertex, u32>,
+    slot_of_face: HashMap<(TetId, u8), u32>,
+    slot_of_vertex: HashMap<SkinVertex, u32>,
 }
 
 impl Skin {
@@ -141,9 +141,9 @@ impl Skin {
         }
         for moved in &delta.moved {
             for opposite in 0..4 {
-                if let Some(place) = self.place_of_face.remove(&(moved.from, opposite)) {
-                    self.place_of_face.insert((moved.to, opposite), place);
-                    self.faces[place as usize].0 = moved.to;
+                if let Some(slot) = self.slot_of_face.remove(&(moved.from, opposite)) {
+                    self.slot_of_face.insert((moved.to, opposite), slot);
+                    self.faces[slot as usize].0 = moved.to;
                 }
             }
         }
@@ -152,7 +152,7 @@ impl Skin {
         }
         change
             .triangles
-            .retain(|&place| place < self.triangles.len());
+            .retain(|&slot| slot < self.triangles.len());
         for list in [&mut change.triangles, &mut change.vertices] {
             list.sort_unstable();
             list.dedup();
@@ -187,15 +187,15 @@ impl Skin {
     fn add(&mut self, triangle: &BoundaryTriangle, change: &mut SkinChange) {
         let tag = triangle.tag;
         let corners = triangle.particles.map(|particle| {
-            let (place, is_new) = self.vertex(SkinVertex { particle, tag });
-            change.vertices.extend(is_new.then_some(place as usize));
-            place
+            let (slot, is_new) = self.vertex(SkinVertex { particle, tag });
+            change.vertices.extend(is_new.then_some(slot as usize));
+            slot
         });
         let face = (triangle.tet, triangle.opposite);
         let end = self.triangles.len();
         self.triangles.push(corners);
         self.faces.push(face);
-        let before = self.place_of_face.insert(face, index(end));
+        let before = self.slot_of_face.insert(face, index(end));
         assert!(before.is_none(), "a face is on the boundary once");
         change.triangles.push(end);
         if tag == FaceTag::Outer {
@@ -212,46 +212,46 @@ impl Skin {
         }
         self.triangles.swap(a, b);
         self.faces.swap(a, b);
-        for place in [a, b] {
-            self.place_of_face.insert(self.faces[place], index(place));
-            change.triangles.push(place);
+        for slot in [a, b] {
+            self.slot_of_face.insert(self.faces[slot], index(slot));
+            change.triangles.push(slot);
         }
     }
 
-    /// The place of a vertex and whether it is new.
+    /// The slot of a vertex and whether it is new.
     fn vertex(&mut self, vertex: SkinVertex) -> (u32, bool) {
-        if let Some(&place) = self.place_of_vertex.get(&vertex) {
-            self.uses[place as usize] += 1;
-            return (place, false);
+        if let Some(&slot) = self.slot_of_vertex.get(&vertex) {
+            self.uses[slot as usize] += 1;
+            return (slot, false);
         }
-        let place = self.vacant.pop().unwrap_or_else(|| {
+        let slot = self.vacant.pop().unwrap_or_else(|| {
             self.vertices.push(vertex);
             self.uses.push(0);
             index(self.vertices.len() - 1)
         });
-        self.vertices[place as usize] = vertex;
-        self.uses[place as usize] = 1;
-        self.place_of_vertex.insert(vertex, place);
-        (place, true)
+        self.vertices[slot as usize] = vertex;
+        self.uses[slot as usize] = 1;
+        self.slot_of_vertex.insert(vertex, slot);
+        (slot, true)
     }
 
     fn remove(&mut self, triangle: &BoundaryTriangle, change: &mut SkinChange) {
         let face = (triangle.tet, triangle.opposite);
-        let place = self.place_of_face.get(&face).copied();
-        let mut place = place.expect("the triangle was on the boundary") as usize;
-        if place < self.outer {
+        let slot = self.slot_of_face.get(&face).copied();
+        let mut slot = slot.expect("the triangle was on the boundary") as usize;
+        if slot < self.outer {
             self.outer -= 1;
-            self.swap(place, self.outer, change);
-            place = self.outer;
+            self.swap(slot, self.outer, change);
+            slot = self.outer;
         }
         let last = self.triangles.len() - 1;
-        self.swap(place, last, change);
+        self.swap(slot, last, change);
         self.faces.pop();
-        self.place_of_face.remove(&face);
+        self.slot_of_face.remove(&face);
         for v in self.triangles.pop().into_iter().flatten() {
             self.uses[v as usize] -= 1;
             if self.uses[v as usize] == 0 {
-                self.place_of_vertex.remove(&self.vertices[v as usize]);
+                self.slot_of_vertex.remove(&self.vertices[v as usize]);
                 self.vacant.push(v);
             }
         }

@@ -98,7 +98,7 @@ fn the_guard_bounds_the_volume_of_children() {
         min_volume_ratio: 0.02,
         ..CutOptions::default()
     };
-    assert!(matches!(options.check(), Err(CutError::Guard { .. })));
+    assert!(matches!(options.check(), Err(CutError::VolumeLimit { .. })));
 }
 
 /// What would grow beyond the limit is refused, says how large it would be, and changes nothing.

@@ -98,19 +98,19 @@ impl Tracked {
         self.apply_delta(&delta)
     }
 
-    /// Moves a blade by `way` in `frames` steps; returns how many pieces came off and the most looks of a frame.
+    /// Moves a blade by `way` in `frames` steps; returns how many pieces came off and the most visited tets of a frame.
     fn sweep(&mut self, blade: [DVec3; 2], way: DVec3, frames: u32) -> (usize, usize) {
         let rest = self.body.mesh().positions.clone();
         let mut stroke = Sweep::new(&self.body, &rest, &blade, CutOptions::default()).unwrap();
-        let (mut came_off, mut looks) = (0, 0);
+        let (mut came_off, mut visited) = (0, 0);
         for frame in 1..=frames {
             let pose = blade.map(|x| x + way * (f64::from(frame) / f64::from(frames)));
             let rest = self.body.mesh().positions.clone();
             let delta = stroke.advance(&mut self.body, &rest, &pose).unwrap();
             came_off += self.apply_delta(&delta).len();
-            looks = looks.max(self.pieces.looks());
+            visited = visited.max(self.pieces.visited_tets());
         }
-        (came_off, looks)
+        (came_off, visited)
     }
 
     /// Takes away the tets that `gone` picks, the last ones taking over the free slots.
@@ -230,7 +230,7 @@ fn who_keeps_the_number() {
     assert_eq!(parents, [None, Some(0), Some(0), Some(0)]);
     // The same again is nothing, and costs nothing.
     assert!(tracked.plane(DVec3::X * 6.0, DVec3::X, 0.0).is_empty());
-    assert_eq!(tracked.pieces.looks(), 0);
+    assert_eq!(tracked.pieces.visited_tets(), 0);
 }
 
 /// One cut takes parts off several pieces, and several parts off one.
@@ -316,8 +316,8 @@ fn parts_that_come_off_together() {
         .collect();
     sizes.sort_unstable();
     assert_eq!(sizes, [6, 6 * 8, 6 * 27]);
-    let looks = tracked.pieces.looks();
-    assert!(looks < tets / 4, "{looks} looks for {tets} tets");
+    let visited = tracked.pieces.visited_tets();
+    assert!(visited < tets / 4, "{visited} visited tets for {tets} tets");
 }
 
 /// A mesh of several bodies starts with as many pieces.
@@ -365,11 +365,11 @@ fn looks_follow_the_cut() {
     let mut slit = Tracked::new(jittered_box(24, 0.1, 7));
     let tets = slit.body.mesh().tets.len();
     let blade = [DVec3::new(0.47, 0.3, 1.1), DVec3::new(0.47, 0.45, 1.1)];
-    let (came_off, looks) = slit.sweep(blade, DVec3::NEG_Z * 0.5, 30);
+    let (came_off, visited) = slit.sweep(blade, DVec3::NEG_Z * 0.5, 30);
     assert_eq!(came_off, 0);
     assert!(
-        looks > 0 && looks < tets / 20,
-        "{looks} looks for {tets} tets"
+        visited > 0 && visited < tets / 20,
+        "{visited} visited tets for {tets} tets"
     );
 
     // A tet has 4 corners, each part is searched once and gathered once, and the other side is searched as far.
@@ -379,10 +379,10 @@ fn looks_follow_the_cut() {
     let [PieceEvent::Detached { tets: chip, .. }] = events[..] else {
         panic!("{events:?}");
     };
-    let looks = corner.pieces.looks();
+    let visited = corner.pieces.visited_tets();
     assert!(chip < tets / 100, "{chip} tets came off");
     // VertexStars at the boundary are smaller than inside, hence 20 instead of 12.
-    assert!(looks < 20 * chip, "{looks} looks for a chip of {chip}");
+    assert!(visited < 20 * chip, "{visited} visited tets for a chip of {chip}");
 
     // Halved bodies and rings cut once make it count all tets, after a search that looked at tets a quarter as often.
     let mut halved = Tracked::new(kuhn_box([12; 3], DVec3::ONE));
@@ -390,14 +390,14 @@ fn looks_follow_the_cut() {
     let mut ring = Tracked::new(generate(Shape::Torus, 3000).unwrap());
     let half = |angle: f64| [DVec3::ZERO, DVec3::new(angle.cos(), angle.sin(), 0.0) * 3.0];
     let pose = |angle: f64| half(angle).map(|x| x + DVec3::Z * 2.0);
-    let (came_off, looks) = ring.sweep(pose(0.4), DVec3::NEG_Z * 4.0, 8);
+    let (came_off, visited) = ring.sweep(pose(0.4), DVec3::NEG_Z * 4.0, 8);
     assert_eq!(came_off, 0);
-    for (tracked, looks) in [(&halved, halved.pieces.looks()), (&ring, looks)] {
+    for (tracked, visited) in [(&halved, halved.pieces.visited_tets()), (&ring, visited)] {
         let tets = tracked.body.mesh().tets.len();
         // A round of the searches may go over the limit by the stars of all seeds.
         assert!(
-            4 * looks > 5 * tets && looks < 2 * tets,
-            "{looks} looks for {tets} tets"
+            4 * visited > 5 * tets && visited < 2 * tets,
+            "{visited} visited tets for {tets} tets"
         );
     }
     assert_eq!(ring.sweep(pose(2.4), DVec3::NEG_Z * 4.0, 8).0, 1);

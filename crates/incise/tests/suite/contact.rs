@@ -888,3 +888,32 @@ fn a_thickness_parts_bodies_but_not_a_cut() {
     let sides = gap(&|x| x.x, 0.15625, &|_| true);
     assert!(sides.1 - sides.0 < 0.01 * thickness, "{sides:?}");
 }
+
+/// A body that no pair names is cut obliquely and its halves slide without friction: they touch although the body does not
+/// touch itself elsewhere, also once the sides of the cut have slid apart.
+#[test]
+fn pieces_of_a_body_alone_touch_without_self_contact() {
+    let mut builder = Simulation::builder();
+    builder
+        .gravity(GRAVITY)
+        .ground(0.0, 0.5)
+        .solver(solver(Precision::F32, 20));
+    for at in [DVec3::ZERO, dvec3(0.0, 0.0, EDGE), dvec3(2.0, 0.0, 0.0)] {
+        builder.add_body(cube(at).young_modulus(1e6).damping(0.005));
+    }
+    builder.contact(ContactSpec {
+        pairs: ContactPairs::Only(vec![[0, 1]]),
+        self_contact: false,
+        friction: 0.0,
+        ..ContactSpec::default()
+    });
+    let middle = dvec3(2.0 + 0.5 * EDGE, 0.5 * EDGE, 0.5 * EDGE);
+    builder.add_stroke(cut(1, middle, dvec3(0.5, 0.0, 1.0)));
+    let mut simulation = builder.build().unwrap();
+    for frame in 0..16 {
+        simulation.step().unwrap();
+        let inside = intruders(&simulation, 0.02 * EDGE);
+        assert_eq!(inside, 0, "{frame}: {:?}", simulation.report().contact);
+    }
+    assert!(simulation.report().contact.unwrap().active > 0);
+}

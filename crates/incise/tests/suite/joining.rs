@@ -5,7 +5,7 @@ use incise::meshing::{Shape, generate};
 use incise::scene::{
     AttachmentSpec, DistanceSpec, EndSpec, Precision, Region, SolverSpec, StrokeSpec, Substeps,
 };
-use incise::{Body, Simulation};
+use incise::{Body, Scene, Simulation, SimulationBuilder};
 
 /// Three boxes in a row without gravity, each in an island of its own.
 fn row(precision: Precision) -> Simulation {
@@ -244,4 +244,56 @@ fn bodies_are_not_joined_under_a_moving_blade() {
     simulation.add_distance(&rod(0, 1)).unwrap();
     simulation.step().unwrap();
     simulation.check().unwrap();
+}
+
+/// A blade has cut the middle body and ends between frames, so the mesh waits to be improved when the bodies are joined.
+/// Improvements after the join take out particles of cuts only, whichever body they are of.
+#[test]
+fn a_join_keeps_what_waits_to_be_improved_and_original_particles() {
+    let mut scene = Scene::default();
+    scene.cutting.improve = true;
+    let mut builder = SimulationBuilder::from_scene(scene);
+    builder.solver(SolverSpec {
+        substeps: Substeps::Fixed(10),
+        ..SolverSpec::default()
+    });
+    for x in [-2.0, 0.0, 2.0] {
+        let mesh = generate(Shape::Box, 200).unwrap();
+        builder.add_body(Body::new(mesh).position(dvec3(x, 0.0, 0.0)));
+    }
+    let mut simulation = builder.build().unwrap();
+    let originals = simulation.mesh().positions.len();
+    let blade = |z: f64| [dvec3(0.07, -1.0, z), dvec3(0.07, 1.0, z)];
+    let stroke = simulation.begin_stroke(&blade(0.8), 0.0).unwrap();
+    simulation.step().unwrap();
+    for frame in 1..=8 {
+        let pose = blade(0.8 - 0.2 * f64::from(frame));
+        simulation.move_blade(stroke, &pose).unwrap();
+        simulation.step().unwrap();
+    }
+    simulation.end_stroke(stroke).unwrap();
+    simulation.add_distance(&rod(0, 1)).unwrap();
+    let collapsed = |simulation: &mut Simulation| {
+        let report = simulation.step().unwrap();
+        report.cut.as_ref().map_or(0, |cut| cut.collapsed)
+    };
+    assert!(collapsed(&mut simulation) > 0);
+    simulation.check().unwrap();
+    simulation
+        .cut(StrokeSpec::Plane {
+            frame: 0,
+            point: [0.0, 0.05, 0.02],
+            normal: [0.1, 1.0, 0.1],
+            snap: 0.0,
+        })
+        .unwrap();
+    assert!(collapsed(&mut simulation) > 0);
+    simulation.check().unwrap();
+    let mut has_tet = vec![false; originals];
+    for p in simulation.mesh().tets.iter().flatten() {
+        if let Some(has_tet) = has_tet.get_mut(p.index()) {
+            *has_tet = true;
+        }
+    }
+    assert!(has_tet.iter().all(|has_tet| *has_tet));
 }
