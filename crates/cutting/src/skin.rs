@@ -150,9 +150,7 @@ impl Skin {
         for triangle in &delta.surface_added {
             self.add(triangle, &mut change);
         }
-        change
-            .triangles
-            .retain(|&slot| slot < self.triangles.len());
+        change.triangles.retain(|&slot| slot < self.triangles.len());
         for list in [&mut change.triangles, &mut change.vertices] {
             list.sort_unstable();
             list.dedup();

@@ -382,7 +382,10 @@ fn looks_follow_the_cut() {
     let visited = corner.pieces.visited_tets();
     assert!(chip < tets / 100, "{chip} tets came off");
     // VertexStars at the boundary are smaller than inside, hence 20 instead of 12.
-    assert!(visited < 20 * chip, "{visited} visited tets for a chip of {chip}");
+    assert!(
+        visited < 20 * chip,
+        "{visited} visited tets for a chip of {chip}"
+    );
 
     // Halved bodies and rings cut once make it count all tets, after a search that looked at tets a quarter as often.
     let mut halved = Tracked::new(kuhn_box([12; 3], DVec3::ONE));
