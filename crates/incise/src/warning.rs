@@ -99,6 +99,13 @@ impl Warning {
                 format!("its plane passes {point} m with normal {normal}")
             }
         };
+        // Within the box of a body it may have met tets: a slice that is thinner than the snap distance is not cut off.
+        let is_in_box = nearest.is_some_and(|(_, bounds)| reach.distance(&bounds) <= 0.0);
+        let what = if is_in_box {
+            "the stroke cut nothing, because it passes beside the body or within the snap distance of an earlier cut"
+        } else {
+            "the stroke met no tet"
+        };
         let body = match nearest {
             Some((body, bounds)) => {
                 let distance = reach.distance(&bounds);
@@ -117,7 +124,7 @@ impl Warning {
         };
         Self {
             code: WarningCode::StrokeMissed,
-            message: format!("the stroke met no tet: {blade}; {body}"),
+            message: format!("{what}: {blade}; {body}"),
             location: field,
         }
     }

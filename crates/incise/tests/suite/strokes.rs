@@ -564,3 +564,24 @@ fn improvement_after_strokes_keeps_everything_current() {
         assert!((kept / volume - 1.0).abs() < 1e-12);
     }
 }
+
+/// A slice thinner than the snap distance is not cut off: the stroke has met the body, so nothing is said of units.
+#[test]
+fn a_slice_that_is_too_thin_is_not_told_to_have_missed() {
+    let body = body("box", 1500, [0.0; 3]);
+    let strokes = [0.1, 0.101].map(|x| plane(1, [x, 0.0, 0.0], [1.0, 0.0, 0.0]) + "snap = 0.1\n");
+    let mut simulation =
+        simulation(&Scene::from_toml(&format!("{body}{}", strokes.concat())).unwrap());
+    let mut told = Vec::new();
+    for _ in 0..4 {
+        let report = simulation.step().unwrap();
+        told.extend(report.warnings().iter().map(ToString::to_string));
+    }
+    assert_eq!(simulation.pieces().len(), 2);
+    let told: Vec<_> = told
+        .iter()
+        .filter(|text| text.contains("stroke[1]"))
+        .collect();
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert!(told[0].contains("within the snap distance"), "{told:?}");
+}
