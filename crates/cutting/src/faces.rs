@@ -1,6 +1,6 @@
 //! [`Faces`]: for each face of a tet what lies behind it, editable in constant time.
 //!
-//! One number a face, four a tet: the place of the same face in the neighboring tet, or, on the boundary, the place in
+//! One number a face, four a tet: the slot of the same face in the neighboring tet, or, on the boundary, the slot in
 //! a dense list of boundary triangles. So neighbors are found without a search, and the boundary needs no pass over the
 //! mesh. Face `4 t + k` is the face of tet `t` opposite to its corner `k`.
 //!
@@ -12,7 +12,7 @@ use incise_mesh::{Bounds, ParticleId, TetId, TetMesh};
 use crate::delta::{BoundaryTriangle, FaceTag};
 use crate::index::index;
 
-/// Marks a place in the list of boundary triangles.
+/// Marks a slot in the list of boundary triangles.
 const BOUNDARY: u32 = 1 << 31;
 /// A face between children of one tet whose twin is not known yet.
 pub(crate) const INNER: u32 = u32::MAX;
@@ -22,7 +22,7 @@ pub(crate) const TILE: usize = 64;
 /// The corners of the face opposite to each corner, counterclockwise seen from outside a positive tet.
 const OPPOSITE: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// A face by its place `4 tet + corner it lies opposite to`.
+/// A face by its index `4 tet + corner it lies opposite to`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Face(u32);
@@ -121,13 +121,13 @@ impl Faces {
     }
 
     /// A number for each tile of the boundary triangles that changes when a triangle comes to it. Parts of a triangle
-    /// that take its place do not count.
+    /// that take its slot do not count.
     pub(crate) fn versions(&self) -> &[u32] {
         &self.versions
     }
 
-    fn note_change(&mut self, place: usize) {
-        let tile = place / TILE;
+    fn note_change(&mut self, slot: usize) {
+        let tile = slot / TILE;
         if tile == self.versions.len() {
             self.versions.push(0);
         }
@@ -179,15 +179,15 @@ impl Faces {
         }
         let sides = sides(mesh, among.iter().copied());
         self.pair_up(&sides);
-        // One part of a boundary triangle takes its place in the list, the others are appended.
+        // One part of a boundary triangle takes its slot in the list, the others are appended.
         outside.sort_unstable();
         let mut last = None;
         for (code, face) in outside {
-            let place = (code & !BOUNDARY) as usize;
+            let slot = (code & !BOUNDARY) as usize;
             if last == Some(code) {
-                self.open(face, self.boundary[place].1);
+                self.open(face, self.boundary[slot].1);
             } else {
-                self.boundary[place].0 = face;
+                self.boundary[slot].0 = face;
                 self.links[face.0 as usize] = code;
             }
             last = Some(code);
@@ -196,10 +196,10 @@ impl Faces {
 
     /// Makes a face a boundary triangle. Its link must not be one of the boundary.
     pub(crate) fn open(&mut self, face: Face, tag: FaceTag) {
-        let place = index(self.boundary.len());
+        let slot = index(self.boundary.len());
         self.boundary.push((face, tag));
-        self.note_change(place as usize);
-        self.links[face.0 as usize] = BOUNDARY | place;
+        self.note_change(slot as usize);
+        self.links[face.0 as usize] = BOUNDARY | slot;
     }
 
     /// Takes a boundary triangle from the list; its link is then [`INNER`].
@@ -221,15 +221,15 @@ impl Faces {
 
     /// Gives a tet's faces to another slot.
     pub(crate) fn move_tet(&mut self, from: TetId, to: TetId) {
-        for (face, place) in Face::of(from).into_iter().zip(Face::of(to)) {
+        for (face, slot) in Face::of(from).into_iter().zip(Face::of(to)) {
             let link = self.links[face.0 as usize];
-            self.links[place.0 as usize] = link;
+            self.links[slot.0 as usize] = link;
             match link {
                 INNER => {}
                 link if link & BOUNDARY != 0 => {
-                    self.boundary[(link & !BOUNDARY) as usize].0 = place;
+                    self.boundary[(link & !BOUNDARY) as usize].0 = slot;
                 }
-                twin => self.links[twin as usize] = place.0,
+                twin => self.links[twin as usize] = slot.0,
             }
         }
     }

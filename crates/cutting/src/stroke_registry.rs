@@ -65,9 +65,9 @@ impl StrokeRegistry {
     pub fn append(&mut self, other: &Self, particles: usize) {
         let first = self.strokes;
         self.known
-            .extend(other.known.iter().map(|(&(p, place), &(stroke, mark))| {
+            .extend(other.known.iter().map(|(&(p, slot), &(stroke, mark))| {
                 let p = ParticleId::new(particles + p.index());
-                ((p, place), (first + stroke, mark))
+                ((p, slot), (first + stroke, mark))
             }));
         self.strokes += other.strokes;
     }
@@ -92,12 +92,12 @@ impl StrokeRegistry {
     }
 
     fn insert(&mut self, particle: ParticleId, stroke: u32, mark: Mark) {
-        let place = self
+        let slot = self
             .entries(particle)
             .take_while(|(of, _)| *of != stroke)
             .count();
-        let place = u32::try_from(place).unwrap_or(u32::MAX);
-        self.known.insert((particle, place), (stroke, mark));
+        let slot = u32::try_from(slot).unwrap_or(u32::MAX);
+        self.known.insert((particle, slot), (stroke, mark));
     }
 
     /// Takes what earlier strokes of the same surface knew of the particles around the hits over into `surface`.
