@@ -25,6 +25,7 @@ mod gpu_settings;
 mod grab;
 mod interaction;
 mod joining;
+mod joining_random;
 mod kappa;
 mod live;
 mod live_bodies;
