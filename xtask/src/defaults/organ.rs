@@ -161,14 +161,13 @@ pub(super) fn measure(
     let body = report.bodies.first();
     let reference = |substeps| {
         let mut scene = scene.clone();
-        scene.solver = SolverSpec {
-            time_step: scene.solver.time_step,
-            substeps: Substeps::Fixed(substeps),
-            iterations: REFERENCE_ROUNDS,
-            two_level: true,
-            precision: Precision::F64,
-            ..SolverSpec::of(Method::Vbd)
-        };
+        scene.solver = SolverSpec::of(Method::Vbd).with(|spec| {
+            spec.time_step = scene.solver.time_step;
+            spec.substeps = Substeps::Fixed(substeps);
+            spec.iterations = REFERENCE_ROUNDS;
+            spec.two_level = true;
+            spec.precision = Precision::F64;
+        });
         Motion::of(&scene, FRAMES, None)
     };
     let best = reference(REFERENCE_SUBSTEPS)?;
