@@ -165,7 +165,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random, snap: f64) -> Str
 
 /// Scene with a body of 25 cm from a mesh file.
 fn scene(file: PathBuf, mesh: &TetMesh, young_modulus: f64, precision: Precision) -> Scene {
-    let (low, high) = ends(mesh);
+    let (low, high) = ends(mesh.positions.iter().copied());
     let mut scene = Scene::default();
     scene.report.quantities = vec![Quantity::Speed, Quantity::Volume, Quantity::Kappa];
     scene.solver.precision = precision;
@@ -179,9 +179,9 @@ fn scene(file: PathBuf, mesh: &TetMesh, young_modulus: f64, precision: Precision
     scene
 }
 
-pub(super) fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
-    let positions = mesh.positions.iter();
-    positions.fold((DVec3::MAX, DVec3::MIN), |(low, high), &x| {
+/// Corners of the smallest box around positions.
+pub(super) fn ends(positions: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    positions.fold((DVec3::MAX, DVec3::MIN), |(low, high), x| {
         (low.min(x), high.max(x))
     })
 }
@@ -200,7 +200,7 @@ pub(super) fn load(
         .mesh()?
         .context("the body of this scene is generated")?;
     let mut scene = scene(file, &mesh, young_modulus, precision);
-    let (low, high) = ends(&mesh);
+    let (low, high) = ends(mesh.positions.iter().copied());
     let height = (high.z - low.z) * scene.body[0].scale + strokes.drop();
     scene.world.gravity = Some([0.0, 0.0, -9.81]);
     scene.world.ground = Some(GroundSpec::default().with(|spec| {
