@@ -32,7 +32,7 @@ const FRAMES: u32 = 3;
 /// Finds the contacts of a copy of an island at its present positions, hands them to a copy of its solver, and tells the
 /// milliseconds of a frame that takes; none without contact.
 fn detect(island: &Island, solver: &mut AnySolver) -> Result<f64, Error> {
-    let Some(mut contacts) = island.contacts.clone() else {
+    let Some(mut contacts) = island.constraints.contacts.clone() else {
         return Ok(0.0);
     };
     let Island {
@@ -90,7 +90,7 @@ pub(crate) fn fit(islands: &mut [Island], spec: &SolverSpec, budget: f64) -> Res
         costs.push((of_one, of_one * f64::from(settings.substeps)));
     }
     // A number that a scene names, of a joined body too, stays, and so does VBD.
-    let open = |island: &Island| island.leaves_substeps_open && !island.chose_vbd();
+    let open = |island: &Island| island.judged.leaves_substeps_open && !island.chose_vbd();
     let of = |wanted: bool| -> f64 {
         let each = islands.iter().zip(&costs);
         let those = each.filter(|(island, _)| open(island) == wanted);
@@ -109,7 +109,7 @@ pub(crate) fn fit(islands: &mut [Island], spec: &SolverSpec, budget: f64) -> Res
             per_tet: of_one / island.cuttable.mesh().tets.len().max(1) as f64,
             share: whole_cost * factor,
         };
-        island.budget = Some(limits);
+        island.judged.budget = Some(limits);
         let most = limits
             .most(island.cuttable.mesh().tets.len())
             .min(spec.max_substeps);
@@ -121,9 +121,10 @@ pub(crate) fn fit(islands: &mut [Island], spec: &SolverSpec, budget: f64) -> Res
         };
         island.take_substeps(substeps);
         let missed = island
+            .judged
             .choice
             .is_some_and(|choice| choice.shortfall == Some(Shortfall::Budget));
-        if missed && island.leaves_method_open {
+        if missed && island.judged.leaves_method_open {
             try_vbd(island, spec, limits.share)?;
         }
         island.judge_settings();
@@ -143,7 +144,7 @@ fn finest_substeps(island: &Island, spec: &SolverSpec) -> u32 {
 
 /// Two-level VBD in place of too few substeps, if a frame of it fits and promises a smaller error.
 fn try_vbd(island: &mut Island, spec: &SolverSpec, share: f64) -> Result<(), Error> {
-    let Some(choice) = island.choice else {
+    let Some(choice) = island.judged.choice else {
         return Ok(());
     };
     let (own, chosen) = with_vbd(spec, choice);
@@ -158,8 +159,8 @@ fn try_vbd(island: &mut Island, spec: &SolverSpec, share: f64) -> Result<(), Err
     island.solver.backend_mut().end_vbd();
     island.solver.prepare(&own, &ComputeDevice::default())?;
     island.settings = settings;
-    island.choice = Some(chosen);
+    island.judged.choice = Some(chosen);
     island.spec = own;
-    island.budget = None;
+    island.judged.budget = None;
     Ok(())
 }

@@ -4,6 +4,7 @@
 //! does not slow down others, and a body moves bit-identically to a scene of its own. Cost: that of its parts.
 
 mod join;
+mod judged;
 
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -13,12 +14,10 @@ use incise_cutting::{
     CutDelta, CuttableMesh, ImproveOptions, PieceEvent, PieceTracker, improve, remove_tets,
 };
 use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
-use incise_xpbd::{
-    DistanceConstraint, KappaLimit, Real, SolidBlade, Solver, StepReport, StepSettings,
-    shortest_substep_of_f32,
-};
+use incise_xpbd::{DistanceConstraint, KappaLimit, SolidBlade, StepReport, StepSettings};
 
-use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
+pub(crate) use self::judged::Budget;
+use self::judged::{Judged, accuracy_data};
 use crate::attachment::{Attachment, AttachmentHandle};
 use crate::backend::{AnySolver, each, each_mut};
 use crate::compute_device::ComputeDevice;
@@ -26,8 +25,8 @@ use crate::contacts::Contacts;
 use crate::distance::Distances;
 use crate::forces::Measured;
 use crate::grab::{Grab, Grabs};
-use crate::island_builder::{IslandBuilder, demands, substeps};
-use crate::method::{leaves_open, resolve, tet_solve};
+use crate::island_builder::IslandBuilder;
+use crate::method::{leaves_open, resolve};
 use crate::partition::Partition;
 use crate::recluster::Recluster;
 use crate::report::{Milliseconds, milliseconds};
@@ -35,10 +34,27 @@ use crate::scene::{
     AttachmentSpec, DistanceSpec, Method, Precision, Quantity, SolverSpec, Substeps,
 };
 use crate::sleep::SleepState;
-use crate::substeps::{Choice, Shortfall, evaluate};
 use crate::volume::Volumes;
-use crate::warning::{self, Warning, WarningCode};
+use crate::warning::Warning;
 use crate::{Error, Scene, collider, distance};
+
+/// What acts on the particles of an island besides its tets and gravity.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Constraints {
+    pub(crate) attachments: Vec<Attachment>,
+    /// Frames of removed attachments in the solver, for new ones.
+    pub(crate) spare_frames: Vec<u32>,
+    pub(crate) distances: Distances,
+    /// The interactive grabs.
+    pub(crate) grabs: Grabs,
+    pub(crate) volumes: Option<Volumes>,
+    /// In a scene with contact.
+    pub(crate) contacts: Option<Box<Contacts>>,
+    /// The solid blades of the frame that touch its cuts, with the numbers of their strokes.
+    #[cfg_attr(feature = "save", serde(skip))]
+    pub(crate) blades: Vec<(u32, SolidBlade)>,
+}
 
 /// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
 #[derive(Clone, Debug)]
@@ -57,24 +73,9 @@ pub(crate) struct Island {
     /// The settings of the solver as a scene says them, with the method that was chosen.
     #[cfg_attr(feature = "save", serde(with = "crate::saved::as_toml"))]
     pub(crate) spec: SolverSpec,
-    /// Whether no body of it names a number of substeps.
-    pub(crate) leaves_substeps_open: bool,
-    /// Whether VBD may be chosen for it.
-    pub(crate) leaves_method_open: bool,
-    pub(crate) attachments: Vec<Attachment>,
-    /// Frames of removed attachments in the solver, for new ones.
-    spare_frames: Vec<u32>,
-    pub(crate) distances: Distances,
-    /// The solid blades of the frame that touch its cuts, with the numbers of their strokes.
-    #[cfg_attr(feature = "save", serde(skip))]
-    pub(crate) blades: Vec<(u32, SolidBlade)>,
+    pub(crate) constraints: Constraints,
     /// The forces of the last frame that measured them.
     pub(crate) forces: Option<Box<Measured>>,
-    /// In a scene with contact.
-    pub(crate) contacts: Option<Box<Contacts>>,
-    /// The interactive grabs.
-    pub(crate) grabs: Grabs,
-    volumes: Option<Volumes>,
     /// The present positions.
     pub(crate) positions: Vec<DVec3>,
     /// Its pieces, numbered within the island.
@@ -83,65 +84,11 @@ pub(crate) struct Island {
     pub(crate) initial_volume: f64,
     /// Volume at rest in m³ that strokes have taken away.
     pub(crate) removed_volume: f64,
-    /// Choice of substeps, if the scene leaves it open.
-    #[cfg_attr(feature = "save", serde(with = "crate::substeps::saved"))]
-    pub(crate) choice: Option<Choice>,
-    /// The substeps before all cuts.
-    first_substeps: u32,
-    /// Cost and time limit, in a scene with a budget.
-    pub(crate) budget: Option<Budget>,
-    /// The longest side of the box around its bodies at rest in m.
-    size: f64,
-    /// Volume that is solved less accurately than the accuracy wanted.
-    pub(crate) outside: OutsideVolume,
-    /// Whether the last frame of VBD missed the accuracy wanted.
-    misses_accuracy: bool,
-    /// Warnings for the next report.
-    pub(crate) warnings: Vec<Warning>,
-    /// Change of kappa by the last cut, if it is reported.
-    pub(crate) cut_kappa: Option<CutKappa>,
+    pub(crate) judged: Judged,
     /// Whether it sleeps, in a scene where bodies may.
     pub(crate) sleep: Option<SleepState>,
     /// Background rebuild of the partition, in a scene with `recluster`.
     pub(crate) recluster: Option<Recluster>,
-}
-
-/// Cost of an island and its share of a time budget.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Budget {
-    /// Milliseconds of a substep for each tet.
-    pub(crate) per_tet: f64,
-    /// Milliseconds of a frame.
-    pub(crate) share: f64,
-}
-
-impl Budget {
-    /// The most substeps that fit with a number of tets, at least 1.
-    pub(crate) fn most(self, tets: usize) -> u32 {
-        whole(self.share / (self.per_tet * tets.max(1) as f64))
-    }
-}
-
-/// The number rounded down to a positive integer.
-fn whole(number: f64) -> u32 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the cast saturates, and 0 becomes 1"
-    )]
-    let whole = number as u32;
-    whole.max(1)
-}
-
-/// Change of kappa by cuts.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct CutKappa {
-    /// The largest of a tet before.
-    pub(crate) before: Option<f64>,
-    /// The largest of a tet that was made.
-    pub(crate) new_tets: f64,
 }
 
 /// The limit of kappa that settings ask for, if it is one.
@@ -159,39 +106,6 @@ pub(crate) fn adopt(settings: &mut StepSettings, spec: &SolverSpec) {
     if let (Method::Vbd, Substeps::Fixed(substeps)) = (spec.method, spec.substeps) {
         settings.substeps = substeps;
     }
-}
-
-/// The part of a body's volume outside the accuracy wanted from which a warning is given.
-const OUTSIDE_FRACTION: f64 = 0.01;
-
-/// Cuts raise a chosen number of substeps to at most so many times what it was before them: a live scene must not become
-/// slower without end.
-const MOST_GROWTH: u32 = 2;
-
-/// Factor by which gravity may be weaker than on earth and still decide the precision.
-const WEAKEST: f64 = 1e4;
-
-/// The longest side of the box around points, 0 without points.
-fn longest_side(points: &[DVec3]) -> f64 {
-    let (low, high) = points
-        .iter()
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| {
-            (low.min(*x), high.max(*x))
-        });
-    (high - low).max_element().max(0.0)
-}
-
-/// Material, kappa and volume of a tet.
-fn accuracy_data<R: Real>(
-    solver: &Solver<R>,
-    tet: usize,
-    settings: &StepSettings,
-) -> (u16, f64, f64) {
-    (
-        solver.material_of(tet),
-        solver.kappa_of(tet, settings.substep_time()),
-        solver.rest_volume(tet),
-    )
 }
 
 impl Island {
@@ -237,20 +151,24 @@ impl Island {
         }
         solver.prepare(&spec, compute_device)?;
         let recluster = scene.solver.recluster;
-        let size = longest_side(&cuttable.mesh().positions);
+        let leaves_substeps_open = joined.substeps.iter().all(|s| *s == Substeps::Auto);
+        let mut judged = Judged::new(choice, settings.substeps, cuttable.mesh());
+        (judged.leaves_substeps_open, judged.leaves_method_open) = (leaves_substeps_open, is_open);
         let mut island = Self {
             recluster: recluster.map(Recluster::new),
             solver,
             partition,
             settings: settings.clone(),
-            attachments: joined.attachments,
-            spare_frames: Vec::new(),
-            distances: joined.distances,
-            blades: Vec::new(),
+            constraints: Constraints {
+                attachments: joined.attachments,
+                spare_frames: Vec::new(),
+                distances: joined.distances,
+                grabs: Grabs::default(),
+                volumes,
+                contacts,
+                blades: Vec::new(),
+            },
             forces: None,
-            contacts,
-            grabs: Grabs::default(),
-            volumes,
             positions: Vec::new(),
             pieces: PieceTracker::new(&cuttable),
             initial_volume: cuttable.mesh().total_volume(),
@@ -258,213 +176,18 @@ impl Island {
             cuttable,
             bodies: joined.bodies,
             body_of: joined.body_of,
-            choice,
-            first_substeps: settings.substeps,
-            budget: None,
+            judged,
             spec,
-            leaves_substeps_open: joined.substeps.iter().all(|s| *s == Substeps::Auto),
-            leaves_method_open: is_open,
-            size,
-            outside: OutsideVolume::default(),
-            misses_accuracy: false,
-            warnings: Vec::new(),
-            cut_kappa: None,
             sleep: scene.solver.sleep.map(SleepState::new),
         };
         island.solver.positions(&mut island.positions);
         island.judge_settings();
         let empty = joined.empty_regions.into_iter();
-        island.warnings.extend(empty.map(Warning::of_empty_region));
+        island
+            .judged
+            .warnings
+            .extend(empty.map(Warning::of_empty_region));
         Ok(island)
-    }
-
-    /// Whether VBD was chosen for it.
-    pub(crate) fn chose_vbd(&self) -> bool {
-        self.choice.is_some_and(|choice| choice.by_vbd)
-    }
-
-    /// Whether two-level VBD has an accuracy to reach. Single precision may not resolve it: the strains of a stiff body in
-    /// free fall are rounding.
-    pub(crate) fn must_converge(&self) -> bool {
-        self.spec.method == Method::Vbd && self.spec.two_level && self.spec.accuracy.is_some()
-    }
-
-    /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
-    pub(crate) fn judge_settings(&mut self) {
-        self.warnings.clear();
-        self.misses_accuracy = false;
-        if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
-            let shortest = self.shortest_substep_of_f32();
-            let message = format!(
-                "a substep of {:.1e} s is too short for single precision, which needs {shortest:.1e} s: set precision = \"f64\"",
-                self.settings.substep_time()
-            );
-            self.warn(WarningCode::ShortSubstepF32, message);
-        }
-        if let Some(choice) = self.choice.filter(|_| self.chose_vbd()) {
-            let warning = warning::of_vbd(&self.bodies, &choice, &self.spec);
-            self.warnings.push(warning);
-        }
-        let spec = &self.spec;
-        if spec.method != Method::GaussSeidel {
-            self.outside = OutsideVolume::default();
-            return;
-        }
-        let form = tet_solve(spec.tet_solve);
-        let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
-        let substeps = self.settings.substeps;
-        let mesh = self.cuttable.mesh();
-        let mut judged = evaluate(
-            demands(spec, &self.solver, mesh, |_| true),
-            |_| substeps,
-            form,
-        );
-        let limit = self.choice.and_then(|choice| choice.shortfall);
-        if let Some(Shortfall::Budget | Shortfall::Growth) = limit {
-            judged.shortfall = limit;
-        }
-        let chosen = self.choice.is_some();
-        self.warnings.extend(warning::of_substeps(
-            &self.bodies,
-            &judged,
-            chosen,
-            spec.accuracy,
-        ));
-        let softened = each!(&self.solver, solver => solver.softened());
-        if softened.tets > 0 {
-            let message = format!(
-                "{} of {} tets ({:.1}% of the volume) are softened to kappa_limit",
-                softened.tets,
-                self.cuttable.mesh().tets.len(),
-                100.0 * softened.volume_fraction
-            );
-            self.warn(WarningCode::Softened, message);
-        }
-        self.outside = each!(&self.solver, solver => {
-            let limits = largest_kappas(accuracy, solver.materials(), form);
-            let tets = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings));
-            OutsideVolume::new(limits, tets)
-        });
-    }
-
-    fn warn(&mut self, code: WarningCode, message: String) {
-        self.warnings
-            .push(Warning::new(code, &self.bodies, message));
-    }
-
-    /// Whether the substep is too short for single precision.
-    pub(crate) fn is_too_short_for_f32(&self) -> bool {
-        self.settings.substep_time() < 0.999 * self.shortest_substep_of_f32()
-    }
-
-    /// The shortest substep of single precision in s: under weak gravity bodies move more slowly than its rule supposes.
-    fn shortest_substep_of_f32(&self) -> f64 {
-        let gravity = self.settings.gravity.map_or(0.0, |g| g.length());
-        let weakness = if gravity > 0.0 {
-            (9.81 / gravity).clamp(1.0, WEAKEST)
-        } else {
-            1.0
-        };
-        shortest_substep_of_f32(self.size) * weakness.sqrt()
-    }
-
-    /// Takes a number of substeps, from which cuts raise it.
-    pub(crate) fn set_substeps(&mut self, substeps: u32) {
-        self.settings.substeps = substeps;
-        self.first_substeps = substeps;
-    }
-
-    /// Takes a number of substeps, with the error to expect of it.
-    pub(crate) fn take_substeps(&mut self, substeps: u32) {
-        let form = tet_solve(self.spec.tet_solve);
-        let tets = demands(&self.spec, &self.solver, self.cuttable.mesh(), |_| true);
-        let mut choice = evaluate(tets, |_| substeps, form);
-        if choice.shortfall == Some(Shortfall::Cap) {
-            choice.shortfall = Some(Shortfall::Budget);
-        }
-        self.choice = Some(choice);
-        self.set_substeps(substeps);
-    }
-
-    /// After cuts: takes fewer substeps where they no longer fit the budget. Tells whether that is so.
-    fn keep_budget(&mut self) -> bool {
-        let Some(budget) = self.budget.filter(|_| self.spec.method != Method::Vbd) else {
-            return false;
-        };
-        let most = budget.most(self.cuttable.mesh().tets.len());
-        if self.settings.substeps <= most {
-            return false;
-        }
-        self.take_substeps(most);
-        self.judge_settings();
-        true
-    }
-
-    /// Takes over substeps that settings have changed: cuts raise them from there.
-    pub(crate) fn set_first_substeps(&mut self, substeps: u32) {
-        if substeps != self.settings.substeps {
-            self.first_substeps = substeps;
-        }
-    }
-
-    /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
-    pub(crate) fn judge_cut(&mut self, asked: &[Substeps]) {
-        if self.keep_budget() {
-            return;
-        }
-        let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
-        if self.spec.method != Method::GaussSeidel
-            || fraction <= OUTSIDE_FRACTION
-            || self.outside.outside <= 2.0 * self.outside.at_choice
-        {
-            return;
-        }
-        let before = self.settings.substeps;
-        if self.choice.is_some() && self.budget.is_none() && !self.spec.kappa_limit.is_finite() {
-            let (chosen, choice) = substeps(asked, &self.spec, &self.solver, self.cuttable.mesh());
-            let most = MOST_GROWTH.saturating_mul(self.first_substeps);
-            let taken = chosen.min(most).max(before);
-            self.settings.substeps = taken;
-            let ratio = f64::from(before) / f64::from(self.settings.substeps);
-            if let Some(noted) = &mut self.cut_kappa {
-                // Kappa goes with the square of the substep.
-                noted.before = noted.before.map(|kappa| kappa * ratio * ratio);
-                noted.new_tets *= ratio * ratio;
-            }
-            self.choice = match choice {
-                Some(_) if taken < chosen => {
-                    let form = tet_solve(self.spec.tet_solve);
-                    let mesh = self.cuttable.mesh();
-                    let tets = demands(&self.spec, &self.solver, mesh, |_| true);
-                    let mut limited = evaluate(tets, |_| taken, form);
-                    limited.shortfall = Some(Shortfall::Growth);
-                    Some(limited)
-                }
-                choice => choice,
-            };
-            self.judge_settings();
-        }
-        self.outside.at_choice = self.outside.outside;
-        let fraction = self.outside.outside / self.cuttable.mesh().total_volume();
-        if fraction > OUTSIDE_FRACTION {
-            let message = format!(
-                "after cuts {:.1}% of the volume is in tets too small for the accuracy wanted with {} substeps",
-                100.0 * fraction,
-                self.settings.substeps
-            );
-            self.warn(WarningCode::OutsideAccuracy, message);
-        }
-    }
-
-    /// Whether a speed in m/s is beyond anything that the material, gravity and moving parts can cause.
-    pub(crate) fn is_absurd(&self, speed: f64, elapsed: f64) -> bool {
-        let wave = each!(&self.solver, solver => {
-            let waves = solver.materials().iter().map(|m| (m.young_modulus / m.density).sqrt());
-            waves.fold(0.0, f64::max)
-        });
-        let fall = self.settings.gravity.map_or(0.0, |g| g.length() * elapsed);
-        let plausible = 100.0 * wave + 2.0 * fall + 10.0 * self.size / self.settings.time_step;
-        speed.is_nan() || speed > plausible
     }
 
     /// Returns whether the island sleeps: it is not solved until it is woken.
@@ -496,21 +219,25 @@ impl Island {
         // Its body was removed; its colliders are those of all islands and move on.
         if self.cuttable.mesh().tets.is_empty() {
             self.forces = None;
-            if let Some(contacts) = &mut self.contacts {
+            if let Some(contacts) = &mut self.constraints.contacts {
                 contacts.end(&mut self.solver)?;
             }
             collider::advance(&mut self.settings);
             return Ok(StepReport::default());
         }
-        for attachment in &self.attachments {
+        for attachment in &self.constraints.attachments {
             attachment.advance(frame, &mut self.solver);
         }
         self.solver.backend_mut().measure_forces(measuring_forces);
-        if !self.blades.is_empty() {
-            let blades = self.blades.iter().map(|(_, blade)| blade.clone());
+        if !self.constraints.blades.is_empty() {
+            let blades = self
+                .constraints
+                .blades
+                .iter()
+                .map(|(_, blade)| blade.clone());
             self.set_blades(blades.collect())?;
         }
-        let step = if self.contacts.is_some() {
+        let step = if self.constraints.contacts.is_some() {
             self.step_with_contact(keeping_residuals)
         } else {
             let (schedule, settings) = (&self.partition.schedule, &self.settings);
@@ -518,19 +245,19 @@ impl Island {
             backend.step(schedule, settings, keeping_residuals)
         };
         // Also after an error: no blade may stay behind.
-        if !self.blades.is_empty() {
+        if !self.constraints.blades.is_empty() {
             self.set_blades(Vec::new())?;
         }
         let step = step?;
-        let strokes = self.blades.iter().map(|(stroke, _)| *stroke);
+        let strokes = self.constraints.blades.iter().map(|(stroke, _)| *stroke);
         let body_of_tet = |tet| self.body_of_tet(tet);
         let measured = measuring_forces
             .then(|| Measured::of(&self.solver, &self.cuttable, body_of_tet, strokes));
         self.forces = measured.flatten();
         self.judge_step();
         collider::advance(&mut self.settings);
-        self.grabs.arrive();
-        for attachment in &mut self.attachments {
+        self.constraints.grabs.arrive();
+        for attachment in &mut self.constraints.attachments {
             attachment.arrive();
         }
         let time = self.settings.time_step;
@@ -559,7 +286,7 @@ impl Island {
     /// A frame in parts, before each of which contacts are found.
     fn step_with_contact(&mut self, keeping_residuals: bool) -> Result<StepReport, Error> {
         let Self {
-            contacts,
+            constraints: Constraints { contacts, .. },
             solver,
             cuttable,
             pieces,
@@ -591,26 +318,6 @@ impl Island {
         contacts.end_frame();
         contacts.judge_depth(cuttable, pieces, time);
         Ok(report)
-    }
-
-    /// Warns when VBD begins to miss the accuracy wanted.
-    fn judge_step(&mut self) {
-        let error = self.solver.backend().vbd_error();
-        let (Some(wanted), Some(error)) = (self.spec.accuracy, error) else {
-            return;
-        };
-        let misses = error > wanted;
-        if misses && !self.misses_accuracy {
-            let message = format!(
-                "{} rounds of two-level VBD leave an estimated error of {:.0}% of the motion, where {:.0}% are wanted; use \
-                 more, smaller frames or a Poisson's ratio farther from 0.5",
-                self.settings.iterations,
-                100.0 * error.min(1e6),
-                100.0 * wanted
-            );
-            self.warn(WarningCode::NotConverged, message);
-        }
-        self.misses_accuracy = misses;
     }
 
     /// The number of the body of a tet in the scene.
@@ -695,32 +402,39 @@ impl Island {
         let (numbers, positions) = self.particles_of(spec.body);
         let field = "attachment".to_owned();
         let mut attachment = Attachment::new(name, field, spec, &positions, |p| numbers[p])?;
-        let spare = self.spare_frames.last().copied();
+        let spare = self.constraints.spare_frames.last().copied();
         attachment.attach(frame, &mut self.solver, spare)?;
-        self.spare_frames.pop();
+        self.constraints.spare_frames.pop();
         if let Some(forces) = &mut self.forces {
             forces.forget(attachment.number);
         }
-        self.attachments.push(attachment);
+        self.constraints.attachments.push(attachment);
         self.wake();
         Ok(())
     }
 
     /// Releases the particles of an attachment and wakes the island; returns whether the attachment exists.
     pub(crate) fn remove_attachment(&mut self, name: AttachmentHandle) -> Result<bool, Error> {
-        let Some(index) = self.attachments.iter().position(|a| a.name == name) else {
+        let Some(index) = self
+            .constraints
+            .attachments
+            .iter()
+            .position(|a| a.name == name)
+        else {
             return Ok(false);
         };
-        self.attachments[index].detach(&mut self.solver)?;
-        self.spare_frames.push(self.attachments[index].number);
-        self.attachments.remove(index);
+        self.constraints.attachments[index].detach(&mut self.solver)?;
+        self.constraints
+            .spare_frames
+            .push(self.constraints.attachments[index].number);
+        self.constraints.attachments.remove(index);
         self.wake();
         Ok(true)
     }
 
     /// Hands changed distance constraints to the solver, and wakes it.
     pub(crate) fn update_distances(&mut self) -> Result<(), Error> {
-        self.distances.hand_to(&mut self.solver)?;
+        self.constraints.distances.hand_to(&mut self.solver)?;
         self.solver
             .backend_mut()
             .update_vbd(&mut Milliseconds::default())?;
@@ -742,11 +456,13 @@ impl Island {
         let mut colliders = self.settings.colliders.iter();
         colliders.any(|collider| collider.velocity != DVec3::ZERO)
             || self
+                .constraints
                 .attachments
                 .iter()
                 .any(|attachment| attachment.moves(frame))
-            || self.grabs.moves()
+            || self.constraints.grabs.moves()
             || self
+                .constraints
                 .blades
                 .iter()
                 .any(|(_, blade)| blade.edge[0] != blade.edge[1])
@@ -796,9 +512,11 @@ impl Island {
         let piece = self.piece_of(nearest);
         let near = self.holdable(point, radius).map(|(_, p)| p);
         let particles: Vec<usize> = near.filter(|&p| self.piece_of(p) == piece).collect();
-        let Self { grabs, solver, .. } = self;
-        grabs.take(grab, solver, &particles, point, compliance)?;
-        if let (Some(forces), Some((handle, _))) = (&mut self.forces, self.grabs.held(grab)) {
+        let grabs = &mut self.constraints.grabs;
+        grabs.take(grab, &mut self.solver, &particles, point, compliance)?;
+        if let (Some(forces), Some((handle, _))) =
+            (&mut self.forces, self.constraints.grabs.held(grab))
+        {
             forces.forget(handle);
         }
         self.wake();
@@ -807,12 +525,12 @@ impl Island {
 
     /// Sets the target of a grab for the end of the next frame; returns whether the grab exists.
     pub(crate) fn move_grab(&mut self, grab: Grab, to: DVec3) -> bool {
-        self.grabs.move_to(&mut self.solver, grab, to)
+        self.constraints.grabs.move_to(&mut self.solver, grab, to)
     }
 
     /// Releases the particles of a grab and wakes the island; returns whether the grab exists.
     pub(crate) fn release(&mut self, grab: Grab) -> Result<bool, Error> {
-        let is_held = self.grabs.release(&mut self.solver, grab)?;
+        let is_held = self.constraints.grabs.release(&mut self.solver, grab)?;
         if is_held {
             self.wake();
         }
@@ -826,8 +544,12 @@ impl Island {
             cuttable,
             positions,
             solver,
-            distances,
-            contacts,
+            constraints:
+                Constraints {
+                    distances,
+                    contacts,
+                    ..
+                },
             ..
         } = self;
         let options = ImproveOptions {
@@ -879,7 +601,7 @@ impl Island {
         for tet in delta.removed.iter().chain(&delta.deleted) {
             let data =
                 each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
-            self.outside.remove(data);
+            self.judged.outside.remove(data);
         }
         self.solver.apply_delta(delta, &self.cuttable)?;
         let mut stiffest = 0.0_f64;
@@ -887,20 +609,20 @@ impl Island {
             let slot = delta.slot_after(tet.tet).index();
             let data = each!(&self.solver, solver => accuracy_data(solver, slot, settings));
             stiffest = stiffest.max(data.1);
-            self.outside.add(data);
+            self.judged.outside.add(data);
         }
-        if let Some(noted) = &mut self.cut_kappa {
+        if let Some(noted) = &mut self.judged.cut_kappa {
             noted.new_tets = noted.new_tets.max(stiffest);
         }
         let events = self.pieces.apply_delta(&self.cuttable, delta);
-        if let Some(contacts) = &mut self.contacts {
+        if let Some(contacts) = &mut self.constraints.contacts {
             contacts.apply_delta(&self.cuttable, delta);
         }
         self.partition.apply_delta(delta, &self.cuttable, ms)?;
         if let Some(recluster) = &mut self.recluster {
             recluster.note(delta);
         }
-        if let Some(volumes) = &self.volumes {
+        if let Some(volumes) = &self.constraints.volumes {
             volumes.apply_delta(
                 &mut self.solver,
                 delta,
@@ -936,27 +658,11 @@ impl Island {
 
     /// Updates volume constraints for another partition.
     pub(crate) fn reschedule_volumes(&mut self) -> Result<(), Error> {
-        let Some(volumes) = &self.volumes else {
+        let Some(volumes) = &self.constraints.volumes else {
             return Ok(());
         };
         let (nothing, schedule) = (CutDelta::default(), &self.partition.schedule);
         volumes.apply_delta(&mut self.solver, &nothing, &self.cuttable, schedule)
-    }
-
-    /// Makes [`Island::apply_delta`] note the largest kappa of the tets that the cuts of a frame create, and if wanted
-    /// that of all tets before the first cut, which is O(tets).
-    pub(crate) fn note_kappa(&mut self, before: bool) {
-        if self.cut_kappa.is_none() {
-            self.cut_kappa = Some(CutKappa {
-                before: before.then(|| self.kappa()),
-                new_tets: 0.0,
-            });
-        }
-    }
-
-    /// The largest kappa of a tet, had none been softened. O(tets).
-    pub(crate) fn kappa(&self) -> f64 {
-        each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
     }
 
     /// Recomputes everything derived and compares.
@@ -978,8 +684,8 @@ impl Island {
         }
         self.solver
             .check(&self.cuttable, &self.partition.schedule)?;
-        self.grabs.check(&self.solver)?;
-        if let Some(contacts) = &self.contacts {
+        self.constraints.grabs.check(&self.solver)?;
+        if let Some(contacts) = &self.constraints.contacts {
             contacts.check(&self.cuttable)?;
         }
         self.partition.check(mesh)?;

@@ -19,7 +19,7 @@ use crate::solver_backend::{LastSubstep, Measures};
 pub(crate) fn contact(islands: &[Island]) -> Option<ContactReport> {
     let mut depths = Vec::new();
     let counts = islands.iter().filter_map(|island| {
-        let contacts = island.contacts.as_ref()?;
+        let contacts = island.constraints.contacts.as_ref()?;
         Some(contacts.count(&island.solver, &mut depths))
     });
     let counts: Vec<_> = counts.collect();
@@ -175,14 +175,14 @@ fn softened_of(island: &Island) -> SoftenedReport {
 /// Substeps and what cuts did to kappa by island; `with_kappa` also those that take a pass over the tets.
 pub(crate) fn by_body(islands: &mut [Island], with_kappa: bool) -> Vec<BodyReport> {
     let report = |island: &mut Island| {
-        let cut = island.cut_kappa.take();
+        let cut = island.judged.cut_kappa.take();
         BodyReport {
             bodies: island.bodies.clone(),
             substeps: island.settings.substeps,
-            method: island.choice.map(|_| ChosenMethod::of(&island.spec)),
-            iterations: island.choice.map(|_| island.settings.iterations),
+            method: island.judged.choice.map(|_| ChosenMethod::of(&island.spec)),
+            iterations: island.judged.choice.map(|_| island.settings.iterations),
             asleep: island.sleep.map(|sleep| sleep.asleep()),
-            choice: island.choice,
+            choice: island.judged.choice,
             kappa: with_kappa.then(|| island.kappa()),
             kappa_before_cut: cut.and_then(|cut| cut.before),
             kappa_of_new_tets: cut.map(|cut| cut.new_tets),

@@ -184,7 +184,7 @@ fn pinned_by(island: &Island, p: ParticleId) -> Option<String> {
         let tet = island.cuttable.around(p).next()?;
         return Some(format!("body[{}].fixed", island.body_of_tet(tet)));
     }
-    let mut attachments = island.attachments.iter();
+    let mut attachments = island.constraints.attachments.iter();
     let of_handle = attachments.find(|attachment| Some(attachment.number) == handle)?;
     Some(of_handle.field().to_owned())
 }

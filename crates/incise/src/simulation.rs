@@ -46,7 +46,7 @@ use crate::{Error, Event, Scene, collider, contacts, distance};
 pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use snapshot::Snapshot;
 
-use state::{Clock, Cut, NextNumbers, State};
+use state::{Clock, Cut, Dependents, NextNumbers, State};
 
 /// A running simulation of a scene: bodies, cuts and solvers, advanced frame by frame.
 ///
@@ -201,10 +201,12 @@ impl Simulation {
                 next: NextNumbers::new(scene),
                 removed: Vec::new(),
                 reporting: scene.report.clone(),
-                pieces: PieceNumbers::new(&islands),
+                dependents: Dependents {
+                    merged,
+                    pieces: PieceNumbers::new(&islands),
+                    on_cut: Vec::new(),
+                },
                 islands,
-                merged,
-                on_cut: Vec::new(),
                 timeline,
                 report: FrameReport::default(),
                 residuals_kept: false,
@@ -235,7 +237,7 @@ impl Simulation {
     /// The number in the merged mesh of a particle of an island.
     #[cfg(feature = "advise")]
     pub(crate) fn particle(&self, island: usize, particle: usize) -> usize {
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => merged.particle(island, particle),
             None => particle,
         }
@@ -369,10 +371,12 @@ impl Simulation {
     /// Collects the contact times of all islands and the contacts that began and ended.
     fn collect_contacts(&mut self, ms: &mut Milliseconds) {
         let State {
-            islands, pieces, ..
+            islands,
+            dependents: Dependents { pieces, .. },
+            ..
         } = &mut self.state;
         for (number, island) in islands.iter_mut().enumerate() {
-            let Some(contacts) = &mut island.contacts else {
+            let Some(contacts) = &mut island.constraints.contacts else {
                 continue;
             };
             ms.contact = ms.contact.max(contacts.take_milliseconds());
@@ -388,7 +392,7 @@ impl Simulation {
             if let Some(overlap) = contacts.take_overlap() {
                 let of_scene = overlap.pieces.map(|piece| pieces.of_scene(number, piece));
                 let warning = overlap.warning(of_scene);
-                island.warnings.push(warning);
+                island.judged.warnings.push(warning);
             }
         }
         ms.contact = ms.contact.min(ms.solve);
@@ -423,7 +427,10 @@ impl Simulation {
         let of_strokes = self.state.timeline.take_warnings();
         self.state.report.warnings.extend(of_strokes);
         for island in &mut self.state.islands {
-            self.state.report.warnings.append(&mut island.warnings);
+            self.state
+                .report
+                .warnings
+                .append(&mut island.judged.warnings);
             let speed = match island.solver.backend().host_max_speed() {
                 Some(speed) => speed,
                 None => self.state.report.max_speed.unwrap_or(0.0),
@@ -471,7 +478,7 @@ impl Simulation {
         self.state
             .islands
             .iter()
-            .any(|island| island.choice.is_some())
+            .any(|island| island.judged.choice.is_some())
     }
 
     /// Whether bodies may sleep.
@@ -520,7 +527,7 @@ impl Simulation {
     /// device, these are the positions of the last [`Simulation::read_back`].
     #[must_use]
     pub fn positions(&self) -> &[DVec3] {
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => &merged.positions,
             None => &self.state.islands[0].positions,
         }
@@ -534,7 +541,7 @@ impl Simulation {
     /// tets; [`repair`](incise_mesh::repair) with `drop_unused` makes a mesh without them.
     #[must_use]
     pub fn mesh(&self) -> &TetMesh {
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => &merged.mesh,
             None => self.state.islands[0].cuttable.mesh(),
         }
@@ -567,7 +574,7 @@ impl Simulation {
         let islands = self.state.islands.iter().enumerate();
         islands.flat_map(move |(g, island)| {
             let triangles = island.cuttable.boundary();
-            triangles.map(move |triangle| match &self.state.merged {
+            triangles.map(move |triangle| match &self.state.dependents.merged {
                 Some(merged) => merged.triangle(g, &triangle),
                 None => triangle,
             })
@@ -578,7 +585,7 @@ impl Simulation {
     /// surface at the rim of a cut can have three such particles, too; [`Simulation::boundary`] tells them apart.
     #[must_use]
     pub fn on_cut(&self) -> &[bool] {
-        &self.state.on_cut
+        &self.state.dependents.on_cut
     }
 
     /// Returns the pieces of all bodies by ascending number, with tets, volume, mass and the piece each was detached
@@ -591,7 +598,7 @@ impl Simulation {
     /// including former ones).
     #[must_use]
     pub fn pieces(&self) -> Vec<PieceReport> {
-        self.state.pieces.report(&self.state.islands)
+        self.state.dependents.pieces.report(&self.state.islands)
     }
 
     /// Returns the piece number of each tet of [`Simulation::mesh`], as in [`Simulation::pieces`]. O(tets).
@@ -599,8 +606,7 @@ impl Simulation {
     pub fn piece_numbers(&self) -> Vec<u32> {
         let State {
             islands,
-            merged,
-            pieces,
+            dependents: Dependents { merged, pieces, .. },
             ..
         } = &self.state;
         let islands = islands.iter().enumerate();
@@ -617,7 +623,7 @@ impl Simulation {
     /// island are numbered after those of the islands before it, so a cut can change their numbers.
     #[must_use]
     pub fn clustering(&self) -> Cow<'_, Clustering> {
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => Cow::Owned(merged.partition(&self.state.islands).0),
             None => Cow::Borrowed(&self.state.islands[0].partition.clustering),
         }
@@ -626,7 +632,7 @@ impl Simulation {
     /// Returns the colors of the clusters. With several islands of bodies they are merged: O(tets).
     #[must_use]
     pub fn coloring(&self) -> Cow<'_, Coloring> {
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => Cow::Owned(merged.partition(&self.state.islands).1),
             None => Cow::Borrowed(self.state.islands[0].partition.coloring()),
         }
@@ -636,7 +642,7 @@ impl Simulation {
     /// wait for each other.
     #[must_use]
     pub fn schedule(&self) -> Cow<'_, Schedule> {
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => {
                 let (clustering, coloring) = merged.partition(&self.state.islands);
                 Cow::Owned(Schedule::new(&clustering, &coloring))
@@ -667,8 +673,9 @@ impl Simulation {
     /// [`Error::Inconsistent`] or [`Error::Cut`] name the first difference.
     pub fn check(&self) -> Result<(), Error> {
         self.state.islands.iter().try_for_each(Island::check)?;
-        self.state.pieces.check(&self.state.islands)?;
+        self.state.dependents.pieces.check(&self.state.islands)?;
         self.state
+            .dependents
             .merged
             .as_ref()
             .map_or(Ok(()), |merged| merged.check(&self.state.islands))

@@ -107,6 +107,7 @@ impl Newton {
                 .zip(&mut bodies);
             for (g, ((part, island), body)) in all.enumerate() {
                 let poses: Vec<[Pose; 2]> = island
+                    .constraints
                     .attachments
                     .iter()
                     .map(|attachment| [frame, frame + 1].map(|f| attachment.pose(f)))
@@ -159,9 +160,9 @@ impl Part {
                 let seat = seat[p] as usize;
                 fixed[seat] |= solver.is_fixed(p);
                 if let Some(number) = solver.handle_of(p).filter(|_| !solver.is_fixed(p)) {
-                    let handle = island.attachments.iter().position(|a| a.number == number);
+                    let handle = island.constraints.attachments.iter().position(|a| a.number == number);
                     let handle = handle.expect("attachments of an island hold its particles");
-                    let pose = island.attachments[handle].pose(0);
+                    let pose = island.constraints.attachments[handle].pose(0);
                     let place = pose.rotation.inverse() * (mesh.positions[p] - pose.position);
                     fixed[seat] = true;
                     held.push((handle, p, place));

@@ -9,7 +9,8 @@
 
 use incise_xpbd::StepSettings;
 
-use super::{Island, adopt, kappa_limit, longest_side};
+use super::judged::Judged;
+use super::{Constraints, Island, adopt, kappa_limit};
 use crate::backend::each;
 use crate::compute_device::ComputeDevice;
 use crate::contacts::Contacts;
@@ -76,12 +77,16 @@ impl Island {
         }
         solver.limit_kappa(None, kappa_limit(&scene.solver, &settings), cuttable.mesh())?;
 
-        let mut distances = self.distances.clone();
-        distances.append(&other.distances, first_particle);
+        let mut distances = self.constraints.distances.clone();
+        distances.append(&other.constraints.distances, first_particle);
         if !distances.is_empty() {
             distances.hand_to(&mut solver)?;
         }
-        let contacts = match (&scene.contact, &self.contacts, &other.contacts) {
+        let contacts = match (
+            &scene.contact,
+            &self.constraints.contacts,
+            &other.constraints.contacts,
+        ) {
             (Some(spec), Some(one), Some(other)) => {
                 let joined = Contacts::joined(spec, &cuttable, one, other, first_piece)?;
                 Some(Box::new(joined))
@@ -90,61 +95,72 @@ impl Island {
         };
         let partition = Partition::new(scene, cuttable.mesh())?;
         let volumes = Volumes::joined(
-            (self.volumes.as_ref(), self.body_of.len()),
-            (other.volumes.as_ref(), other.body_of.len()),
+            (self.constraints.volumes.as_ref(), self.body_of.len()),
+            (other.constraints.volumes.as_ref(), other.body_of.len()),
         );
         if let Some(volumes) = &volumes {
             volumes.constrain(&mut solver, &cuttable, &partition.schedule)?;
         }
         solver.prepare(&spec, compute_device)?;
 
-        let mut attachments = self.attachments.clone();
-        attachments.extend(other.attachments.iter().map(|attachment| {
+        let mut attachments = self.constraints.attachments.clone();
+        attachments.extend(other.constraints.attachments.iter().map(|attachment| {
             let mut attachment = attachment.clone();
             attachment.renumber(particles, first_frame);
             attachment
         }));
-        let spare = other.spare_frames.iter().map(|frame| first_frame + frame);
-        let spare_frames = self.spare_frames.iter().copied().chain(spare).collect();
-        let mut grabs = self.grabs.clone();
-        grabs.append(&other.grabs, first_frame);
+        let spare = other
+            .constraints
+            .spare_frames
+            .iter()
+            .map(|frame| first_frame + frame);
+        let spare_frames = self
+            .constraints
+            .spare_frames
+            .iter()
+            .copied()
+            .chain(spare)
+            .collect();
+        let mut grabs = self.constraints.grabs.clone();
+        grabs.append(&other.constraints.grabs, first_frame);
+        let mut judged = Judged::new(choice, settings.substeps, cuttable.mesh());
+        judged.leaves_substeps_open = asked.iter().all(|s| *s == Substeps::Auto);
+        judged.leaves_method_open = is_open;
         let mut island = Self {
             bodies,
             body_of,
             solver,
             partition,
-            first_substeps: settings.substeps,
             settings,
             spec,
-            leaves_substeps_open: asked.iter().all(|s| *s == Substeps::Auto),
-            leaves_method_open: is_open,
-            attachments,
-            spare_frames,
-            distances,
+            constraints: Constraints {
+                attachments,
+                spare_frames,
+                distances,
+                grabs,
+                volumes,
+                contacts,
+                blades: Vec::new(),
+            },
             forces: None,
-            blades: Vec::new(),
-            contacts,
-            grabs,
-            volumes,
             positions: Vec::new(),
             pieces,
             initial_volume: self.initial_volume + other.initial_volume,
             removed_volume: self.removed_volume + other.removed_volume,
-            choice,
-            budget: None,
-            size: longest_side(&cuttable.mesh().positions),
+            judged,
             cuttable,
-            outside: super::OutsideVolume::default(),
-            misses_accuracy: false,
-            warnings: Vec::new(),
-            cut_kappa: None,
             sleep: scene.solver.sleep.map(SleepState::new),
             recluster: scene.solver.recluster.map(Recluster::new),
         };
         island.solver.positions(&mut island.positions);
         island.judge_settings();
-        let before = self.warnings.iter().chain(&other.warnings).cloned();
-        island.warnings.splice(0..0, before);
+        let before = self
+            .judged
+            .warnings
+            .iter()
+            .chain(&other.judged.warnings)
+            .cloned();
+        island.judged.warnings.splice(0..0, before);
         Ok(island)
     }
 

@@ -182,7 +182,7 @@ impl Simulation {
             ));
         }
         for island in &mut self.state.islands {
-            if let Some(contacts) = &mut island.contacts {
+            if let Some(contacts) = &mut island.constraints.contacts {
                 contacts.set(contact)?;
             }
             island.wake();
@@ -292,7 +292,7 @@ impl Simulation {
         handle: AttachmentHandle,
     ) -> Result<(&mut AnySolver, &mut Attachment), Error> {
         for island in &mut self.state.islands {
-            let mut all = island.attachments.iter_mut();
+            let mut all = island.constraints.attachments.iter_mut();
             if let Some(attachment) = all.find(|attachment| attachment.name == handle) {
                 return Ok((&mut island.solver, attachment));
             }
@@ -347,7 +347,7 @@ impl Simulation {
         let name = DistanceHandle(self.state.next.distance);
         let add = |island: &mut Island| {
             let constraint = island.distance(spec)?;
-            island.distances.add(name, constraint);
+            island.constraints.distances.add(name, constraint);
             island.update_distances()
         };
         if from == to {
@@ -385,7 +385,7 @@ impl Simulation {
         let compliance = within("distance.compliance", compliance, 0.0, 1e9)?;
         self.read_back()?;
         for island in &mut self.state.islands {
-            if let Some(constraint) = island.distances.get_mut(handle) {
+            if let Some(constraint) = island.constraints.distances.get_mut(handle) {
                 (constraint.length, constraint.compliance) = (length, compliance);
                 return island.update_distances();
             }
@@ -400,7 +400,7 @@ impl Simulation {
     pub fn remove_distance(&mut self, handle: DistanceHandle) -> Result<(), Error> {
         self.read_back()?;
         for island in &mut self.state.islands {
-            if island.distances.remove(handle) {
+            if island.constraints.distances.remove(handle) {
                 return island.update_distances();
             }
         }
@@ -470,11 +470,11 @@ impl Simulation {
 
         let state = &mut self.state;
         let islands = &mut state.islands;
-        let merged = &mut state.merged;
+        let merged = &mut state.dependents.merged;
         merged
             .get_or_insert_with(|| MergedMesh::of_one(&islands[0]))
             .add_island(&island);
-        state.pieces.add_island(&island);
+        state.dependents.pieces.add_island(&island);
         islands.push(island);
         state.scene = Arc::new(scene);
         state.residuals_kept = false;
@@ -483,9 +483,9 @@ impl Simulation {
             state.put_joined(0, added, whole);
         }
         let state = &self.state;
-        if !state.on_cut.is_empty() {
+        if !state.dependents.on_cut.is_empty() {
             let particles = self.mesh().positions.len();
-            self.state.on_cut.resize(particles, false);
+            self.state.dependents.on_cut.resize(particles, false);
         }
         self.fit_budget()?;
         Ok(BodyHandle(number))

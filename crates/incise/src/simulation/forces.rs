@@ -16,7 +16,8 @@ impl Simulation {
     #[must_use]
     pub fn attachments(&self) -> Vec<AttachmentHandle> {
         let islands = self.state.islands.iter();
-        let names = islands.flat_map(|island| island.attachments.iter().map(|a| a.name));
+        let names =
+            islands.flat_map(|island| island.constraints.attachments.iter().map(|a| a.name));
         let mut names: Vec<_> = names.collect();
         names.sort_unstable();
         names
@@ -76,7 +77,7 @@ impl Simulation {
     pub fn attachment_force(&self, handle: AttachmentHandle) -> Result<Force, Error> {
         self.check_measured()?;
         for island in &self.state.islands {
-            let mut all = island.attachments.iter();
+            let mut all = island.constraints.attachments.iter();
             if let Some(attachment) = all.find(|attachment| attachment.name == handle) {
                 let measured = island.forces.as_ref();
                 let force = measured.and_then(|measured| measured.handle(attachment.number));
@@ -140,7 +141,7 @@ impl Simulation {
     pub fn grab_force(&self, grab: Grab) -> Result<Force, Error> {
         self.check_measured()?;
         let mut islands = self.state.islands.iter();
-        let held = islands.find_map(|island| Some((island, island.grabs.held(grab)?)));
+        let held = islands.find_map(|island| Some((island, island.constraints.grabs.held(grab)?)));
         let Some((island, (number, point))) = held else {
             let range = "one that was not released";
             return Err(value("grab", format!("{grab:?}"), range));
@@ -282,7 +283,9 @@ impl Simulation {
             let force = self.collider_force(handle);
             add(ForceKind::Collider, handle.number(), None, force);
         }
-        let grabs = islands.iter().flat_map(|island| island.grabs.all_held());
+        let grabs = islands
+            .iter()
+            .flat_map(|island| island.constraints.grabs.all_held());
         for (index, grab) in grabs.enumerate() {
             add(ForceKind::Grab, index, None, self.grab_force(grab));
         }

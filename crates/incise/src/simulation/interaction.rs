@@ -86,7 +86,7 @@ impl Simulation {
     /// Keeps `auto` from choosing VBD, which has no solid blades.
     pub(super) fn keep_off_vbd(&mut self) {
         for island in &mut self.state.islands {
-            island.leaves_method_open = false;
+            island.judged.leaves_method_open = false;
         }
     }
 

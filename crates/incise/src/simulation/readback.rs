@@ -194,7 +194,7 @@ impl Simulation {
     pub fn location_of(&self, particle: ParticleId) -> (usize, usize) {
         let count = self.mesh().positions.len();
         assert!(particle.index() < count, "the mesh has {count} particles");
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => merged.location(particle),
             None => (0, particle.index()),
         }
@@ -245,6 +245,7 @@ impl Simulation {
         let islands = self.state.islands.iter().enumerate();
         let all = islands.flat_map(|(number, island)| {
             let touches = island
+                .constraints
                 .contacts
                 .iter()
                 .flat_map(|contacts| contacts.touches());
@@ -253,7 +254,7 @@ impl Simulation {
         all.map(|(number, touch)| {
             let of_scene = touch
                 .pieces
-                .map(|piece| self.state.pieces.of_scene(number, piece));
+                .map(|piece| self.state.dependents.pieces.of_scene(number, piece));
             ContactForce {
                 pieces: of_scene.map(|(id, _)| id),
                 bodies: of_scene.map(|(_, body)| body),
@@ -291,7 +292,7 @@ impl Simulation {
         }
         let islands = self.state.islands.iter().map(residuals_of_tets);
         let mut islands = islands.collect::<Option<Vec<_>>>()?;
-        match &self.state.merged {
+        match &self.state.dependents.merged {
             Some(merged) => Some(merged.of_tets(&islands)),
             None => islands.pop(),
         }
@@ -302,7 +303,7 @@ impl Simulation {
         for island in &mut self.state.islands {
             island.solver.positions(&mut island.positions);
         }
-        if let Some(merged) = &mut self.state.merged {
+        if let Some(merged) = &mut self.state.dependents.merged {
             merged.collect_positions(&self.state.islands);
         }
     }

@@ -257,7 +257,7 @@ impl ChangedSolver {
             colliders: island.settings.colliders.clone(),
             ..settings.clone()
         };
-        let mut choice = island.choice;
+        let mut choice = island.judged.choice;
         let asked = island.asked(|body| scene.body[body].substeps.unwrap_or(after.substeps));
         let chosen_anew = substeps_follow_from(before) != substeps_follow_from(after);
         if chosen_anew {
@@ -369,11 +369,11 @@ impl ChangedSolver {
         island.sleep = spec.sleep.map(SleepState::new);
         island.set_first_substeps(self.settings.substeps);
         island.settings = self.settings;
-        island.choice = self.choice;
+        island.judged.choice = self.choice;
         island.spec = spec;
-        island.leaves_substeps_open = self.leaves_substeps_open;
-        island.leaves_method_open = self.leaves_method_open;
-        island.budget = None;
+        island.judged.leaves_substeps_open = self.leaves_substeps_open;
+        island.judged.leaves_method_open = self.leaves_method_open;
+        island.judged.budget = None;
         Ok(())
     }
 }

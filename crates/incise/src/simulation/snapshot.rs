@@ -13,7 +13,7 @@
 use std::sync::Arc;
 
 use super::Simulation;
-use super::state::State;
+use super::state::{Dependents, State};
 use crate::compute_device::{ComputeDevice, OpenDevice};
 use crate::island::Island;
 use crate::merged_mesh::MergedMesh;
@@ -46,8 +46,7 @@ impl Snapshot {
     pub fn bytes(&self) -> usize {
         let State {
             islands,
-            merged,
-            on_cut,
+            dependents: Dependents { merged, on_cut, .. },
             timeline,
             ..
         } = &self.0;
@@ -112,6 +111,7 @@ impl Island {
         let pending = self.recluster.as_ref().is_some_and(Recluster::is_pending);
         let partitions = 1 + usize::from(pending);
         let contacts = self
+            .constraints
             .contacts
             .as_ref()
             .map_or(0, |contacts| contacts.bytes());

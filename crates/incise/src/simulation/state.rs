@@ -45,11 +45,7 @@ pub(super) struct State {
     pub(super) reporting: ReportSpec,
     /// In the order of their first bodies.
     pub(super) islands: Vec<Island>,
-    /// All islands together, if there are several.
-    pub(super) merged: Option<MergedMesh>,
-    pub(super) pieces: PieceNumbers,
-    /// Whether a particle lies on a cut; empty before the first.
-    pub(super) on_cut: Vec<bool>,
+    pub(super) dependents: Dependents,
     pub(super) timeline: Timeline,
     #[cfg_attr(feature = "save", serde(skip))]
     pub(super) report: FrameReport,
@@ -82,14 +78,18 @@ pub(super) struct Cut<'a> {
     pub(super) measuring: f64,
 }
 
-/// Data outside an island that depends on its mesh.
-struct Dependents<'a> {
-    merged: &'a mut Option<MergedMesh>,
-    pieces: &'a mut PieceNumbers,
-    on_cut: &'a mut Vec<bool>,
+/// Data of all islands together that depend on their meshes.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(super) struct Dependents {
+    /// All islands as one mesh, if there are several.
+    pub(super) merged: Option<MergedMesh>,
+    pub(super) pieces: PieceNumbers,
+    /// Whether a particle lies on a cut; empty before the first.
+    pub(super) on_cut: Vec<bool>,
 }
 
-impl Dependents<'_> {
+impl Dependents {
     /// Applies the delta of the island of a number to all that depends on its mesh.
     fn apply_delta(
         &mut self,
@@ -155,8 +155,8 @@ impl State {
         let particles = self.islands[into].positions.len();
         self.islands.remove(other);
         self.islands[into] = joined;
-        self.pieces.join(into, other);
-        if let Some(merged) = &mut self.merged {
+        self.dependents.pieces.join(into, other);
+        if let Some(merged) = &mut self.dependents.merged {
             merged.join(into, other);
             // Single precision has rounded them to another origin.
             merged.collect_positions(&self.islands);
@@ -181,16 +181,9 @@ impl State {
             removed,
             timeline,
             islands,
-            merged,
-            pieces,
-            on_cut,
+            dependents,
             ..
         } = self;
-        let mut dependents = Dependents {
-            merged,
-            pieces,
-            on_cut,
-        };
         for removal in removed.iter_mut().filter(|removal| !removal.is_done) {
             let of_body = |island: &Island| island.bodies.contains(&removal.body);
             let Some(number) = islands.iter().position(of_body) else {
@@ -208,13 +201,13 @@ impl State {
             dependents.apply_delta(number, island, delta, cut, ms)
         })?;
         for island in islands {
-            let had_blades = !island.blades.is_empty();
-            island.blades = touching(island, timeline.solids());
+            let had_blades = !island.constraints.blades.is_empty();
+            island.constraints.blades = touching(island, timeline.solids());
             // What a blade has held apart closes.
-            if had_blades && island.blades.is_empty() {
+            if had_blades && island.constraints.blades.is_empty() {
                 island.wake();
             }
-            for (stroke, _) in &island.blades {
+            for (stroke, _) in &island.constraints.blades {
                 timeline.note_touch(*stroke);
             }
         }

@@ -1,0 +1,370 @@
+//! [`Judged`]: chosen substeps and method of an island, and what is known of their accuracy.
+//!
+//! Settings are judged when they are chosen, and again after cuts: small tets may need more substeps than were chosen, or
+//! fewer may fit a time budget. What misses the accuracy wanted is a warning. Cost: O(tets log tets) where substeps are
+//! chosen, O(changed tets) after a cut.
+
+use glam::DVec3;
+use incise_mesh::TetMesh;
+use incise_xpbd::{Real, Solver, StepSettings, shortest_substep_of_f32};
+
+use super::Island;
+use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
+use crate::backend::each;
+use crate::island_builder::{demands, substeps};
+use crate::method::tet_solve;
+use crate::scene::{Method, Substeps};
+use crate::substeps::{Choice, Shortfall, evaluate};
+use crate::warning::{self, Warning, WarningCode};
+
+/// Chosen settings of an island, and what is known of their accuracy.
+#[derive(Clone, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Judged {
+    /// Choice of substeps, if the scene leaves it open.
+    #[cfg_attr(feature = "save", serde(with = "crate::substeps::saved"))]
+    pub(crate) choice: Option<Choice>,
+    /// The substeps before all cuts.
+    pub(crate) first_substeps: u32,
+    /// Whether no body of it names a number of substeps.
+    pub(crate) leaves_substeps_open: bool,
+    /// Whether VBD may be chosen for it.
+    pub(crate) leaves_method_open: bool,
+    /// Cost and time limit, in a scene with a budget.
+    pub(crate) budget: Option<Budget>,
+    /// The longest side of the box around its bodies at rest in m.
+    pub(crate) size: f64,
+    /// Volume that is solved less accurately than the accuracy wanted.
+    pub(crate) outside: OutsideVolume,
+    /// Whether the last frame of VBD missed the accuracy wanted.
+    pub(crate) misses_accuracy: bool,
+    /// Warnings for the next report.
+    pub(crate) warnings: Vec<Warning>,
+    /// Change of kappa by the last cut, if it is reported.
+    pub(crate) cut_kappa: Option<CutKappa>,
+}
+
+impl Judged {
+    /// Settings that were chosen for a mesh before all cuts, not yet judged.
+    pub(super) fn new(choice: Option<Choice>, substeps: u32, mesh: &TetMesh) -> Self {
+        Self {
+            choice,
+            first_substeps: substeps,
+            leaves_substeps_open: false,
+            leaves_method_open: false,
+            budget: None,
+            size: longest_side(&mesh.positions),
+            outside: OutsideVolume::default(),
+            misses_accuracy: false,
+            warnings: Vec::new(),
+            cut_kappa: None,
+        }
+    }
+}
+
+/// Cost of an island and its share of a time budget.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Budget {
+    /// Milliseconds of a substep for each tet.
+    pub(crate) per_tet: f64,
+    /// Milliseconds of a frame.
+    pub(crate) share: f64,
+}
+
+impl Budget {
+    /// The most substeps that fit with a number of tets, at least 1.
+    pub(crate) fn most(self, tets: usize) -> u32 {
+        whole(self.share / (self.per_tet * tets.max(1) as f64))
+    }
+}
+
+/// The number rounded down to a positive integer.
+fn whole(number: f64) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the cast saturates, and 0 becomes 1"
+    )]
+    let whole = number as u32;
+    whole.max(1)
+}
+
+/// Change of kappa by cuts.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct CutKappa {
+    /// The largest of a tet before.
+    pub(crate) before: Option<f64>,
+    /// The largest of a tet that was made.
+    pub(crate) new_tets: f64,
+}
+
+/// The part of a body's volume outside the accuracy wanted from which a warning is given.
+const OUTSIDE_FRACTION: f64 = 0.01;
+
+/// Cuts raise a chosen number of substeps to at most so many times what it was before them: a live scene must not become
+/// slower without end.
+const MOST_GROWTH: u32 = 2;
+
+/// Factor by which gravity may be weaker than on earth and still decide the precision.
+const WEAKEST: f64 = 1e4;
+
+/// Material, kappa and volume of a tet.
+pub(super) fn accuracy_data<R: Real>(
+    solver: &Solver<R>,
+    tet: usize,
+    settings: &StepSettings,
+) -> (u16, f64, f64) {
+    (
+        solver.material_of(tet),
+        solver.kappa_of(tet, settings.substep_time()),
+        solver.rest_volume(tet),
+    )
+}
+
+/// The longest side of the box around points, 0 without points.
+fn longest_side(points: &[DVec3]) -> f64 {
+    let (low, high) = points
+        .iter()
+        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    (high - low).max_element().max(0.0)
+}
+
+impl Island {
+    /// Whether VBD was chosen for it.
+    pub(crate) fn chose_vbd(&self) -> bool {
+        self.judged.choice.is_some_and(|choice| choice.by_vbd)
+    }
+
+    /// Whether two-level VBD has an accuracy to reach. Single precision may not resolve it: the strains of a stiff body in
+    /// free fall are rounding.
+    pub(crate) fn must_converge(&self) -> bool {
+        self.spec.method == Method::Vbd && self.spec.two_level && self.spec.accuracy.is_some()
+    }
+
+    /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
+    pub(crate) fn judge_settings(&mut self) {
+        self.judged.warnings.clear();
+        self.judged.misses_accuracy = false;
+        if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
+            let shortest = self.shortest_substep_of_f32();
+            let message = format!(
+                "a substep of {:.1e} s is too short for single precision, which needs {shortest:.1e} s: set precision = \"f64\"",
+                self.settings.substep_time()
+            );
+            self.warn(WarningCode::ShortSubstepF32, message);
+        }
+        if let Some(choice) = self.judged.choice.filter(|_| self.chose_vbd()) {
+            let warning = warning::of_vbd(&self.bodies, &choice, &self.spec);
+            self.judged.warnings.push(warning);
+        }
+        let spec = &self.spec;
+        if spec.method != Method::GaussSeidel {
+            self.judged.outside = OutsideVolume::default();
+            return;
+        }
+        let form = tet_solve(spec.tet_solve);
+        let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
+        let substeps = self.settings.substeps;
+        let mesh = self.cuttable.mesh();
+        let mut judged = evaluate(
+            demands(spec, &self.solver, mesh, |_| true),
+            |_| substeps,
+            form,
+        );
+        let limit = self.judged.choice.and_then(|choice| choice.shortfall);
+        if let Some(Shortfall::Budget | Shortfall::Growth) = limit {
+            judged.shortfall = limit;
+        }
+        let chosen = self.judged.choice.is_some();
+        self.judged.warnings.extend(warning::of_substeps(
+            &self.bodies,
+            &judged,
+            chosen,
+            spec.accuracy,
+        ));
+        let softened = each!(&self.solver, solver => solver.softened());
+        if softened.tets > 0 {
+            let message = format!(
+                "{} of {} tets ({:.1}% of the volume) are softened to kappa_limit",
+                softened.tets,
+                self.cuttable.mesh().tets.len(),
+                100.0 * softened.volume_fraction
+            );
+            self.warn(WarningCode::Softened, message);
+        }
+        self.judged.outside = each!(&self.solver, solver => {
+            let limits = largest_kappas(accuracy, solver.materials(), form);
+            let tets = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings));
+            OutsideVolume::new(limits, tets)
+        });
+    }
+
+    fn warn(&mut self, code: WarningCode, message: String) {
+        self.judged
+            .warnings
+            .push(Warning::new(code, &self.bodies, message));
+    }
+
+    /// Whether the substep is too short for single precision.
+    pub(crate) fn is_too_short_for_f32(&self) -> bool {
+        self.settings.substep_time() < 0.999 * self.shortest_substep_of_f32()
+    }
+
+    /// The shortest substep of single precision in s: under weak gravity bodies move more slowly than its rule supposes.
+    fn shortest_substep_of_f32(&self) -> f64 {
+        let gravity = self.settings.gravity.map_or(0.0, |g| g.length());
+        let weakness = if gravity > 0.0 {
+            (9.81 / gravity).clamp(1.0, WEAKEST)
+        } else {
+            1.0
+        };
+        shortest_substep_of_f32(self.judged.size) * weakness.sqrt()
+    }
+
+    /// Takes a number of substeps, from which cuts raise it.
+    pub(crate) fn set_substeps(&mut self, substeps: u32) {
+        self.settings.substeps = substeps;
+        self.judged.first_substeps = substeps;
+    }
+
+    /// Takes a number of substeps, with the error to expect of it.
+    pub(crate) fn take_substeps(&mut self, substeps: u32) {
+        let form = tet_solve(self.spec.tet_solve);
+        let tets = demands(&self.spec, &self.solver, self.cuttable.mesh(), |_| true);
+        let mut choice = evaluate(tets, |_| substeps, form);
+        if choice.shortfall == Some(Shortfall::Cap) {
+            choice.shortfall = Some(Shortfall::Budget);
+        }
+        self.judged.choice = Some(choice);
+        self.set_substeps(substeps);
+    }
+
+    /// After cuts: takes fewer substeps where they no longer fit the budget. Tells whether that is so.
+    fn keep_budget(&mut self) -> bool {
+        let Some(budget) = self
+            .judged
+            .budget
+            .filter(|_| self.spec.method != Method::Vbd)
+        else {
+            return false;
+        };
+        let most = budget.most(self.cuttable.mesh().tets.len());
+        if self.settings.substeps <= most {
+            return false;
+        }
+        self.take_substeps(most);
+        self.judge_settings();
+        true
+    }
+
+    /// Takes over substeps that settings have changed: cuts raise them from there.
+    pub(crate) fn set_first_substeps(&mut self, substeps: u32) {
+        if substeps != self.settings.substeps {
+            self.judged.first_substeps = substeps;
+        }
+    }
+
+    /// After cuts: chooses substeps again where too much of the body is outside the accuracy, or warns.
+    pub(crate) fn judge_cut(&mut self, asked: &[Substeps]) {
+        if self.keep_budget() {
+            return;
+        }
+        let fraction = self.judged.outside.outside / self.cuttable.mesh().total_volume();
+        if self.spec.method != Method::GaussSeidel
+            || fraction <= OUTSIDE_FRACTION
+            || self.judged.outside.outside <= 2.0 * self.judged.outside.at_choice
+        {
+            return;
+        }
+        let before = self.settings.substeps;
+        if self.judged.choice.is_some()
+            && self.judged.budget.is_none()
+            && !self.spec.kappa_limit.is_finite()
+        {
+            let (chosen, choice) = substeps(asked, &self.spec, &self.solver, self.cuttable.mesh());
+            let most = MOST_GROWTH.saturating_mul(self.judged.first_substeps);
+            let taken = chosen.min(most).max(before);
+            self.settings.substeps = taken;
+            let ratio = f64::from(before) / f64::from(self.settings.substeps);
+            if let Some(noted) = &mut self.judged.cut_kappa {
+                // Kappa goes with the square of the substep.
+                noted.before = noted.before.map(|kappa| kappa * ratio * ratio);
+                noted.new_tets *= ratio * ratio;
+            }
+            self.judged.choice = match choice {
+                Some(_) if taken < chosen => {
+                    let form = tet_solve(self.spec.tet_solve);
+                    let mesh = self.cuttable.mesh();
+                    let tets = demands(&self.spec, &self.solver, mesh, |_| true);
+                    let mut limited = evaluate(tets, |_| taken, form);
+                    limited.shortfall = Some(Shortfall::Growth);
+                    Some(limited)
+                }
+                choice => choice,
+            };
+            self.judge_settings();
+        }
+        self.judged.outside.at_choice = self.judged.outside.outside;
+        let fraction = self.judged.outside.outside / self.cuttable.mesh().total_volume();
+        if fraction > OUTSIDE_FRACTION {
+            let message = format!(
+                "after cuts {:.1}% of the volume is in tets too small for the accuracy wanted with {} substeps",
+                100.0 * fraction,
+                self.settings.substeps
+            );
+            self.warn(WarningCode::OutsideAccuracy, message);
+        }
+    }
+
+    /// Whether a speed in m/s is beyond anything that the material, gravity and moving parts can cause.
+    pub(crate) fn is_absurd(&self, speed: f64, elapsed: f64) -> bool {
+        let wave = each!(&self.solver, solver => {
+            let waves = solver.materials().iter().map(|m| (m.young_modulus / m.density).sqrt());
+            waves.fold(0.0, f64::max)
+        });
+        let fall = self.settings.gravity.map_or(0.0, |g| g.length() * elapsed);
+        let plausible =
+            100.0 * wave + 2.0 * fall + 10.0 * self.judged.size / self.settings.time_step;
+        speed.is_nan() || speed > plausible
+    }
+
+    /// Warns when VBD begins to miss the accuracy wanted.
+    pub(super) fn judge_step(&mut self) {
+        let error = self.solver.backend().vbd_error();
+        let (Some(wanted), Some(error)) = (self.spec.accuracy, error) else {
+            return;
+        };
+        let misses = error > wanted;
+        if misses && !self.judged.misses_accuracy {
+            let message = format!(
+                "{} rounds of two-level VBD leave an estimated error of {:.0}% of the motion, where {:.0}% are wanted; use \
+                 more, smaller frames or a Poisson's ratio farther from 0.5",
+                self.settings.iterations,
+                100.0 * error.min(1e6),
+                100.0 * wanted
+            );
+            self.warn(WarningCode::NotConverged, message);
+        }
+        self.judged.misses_accuracy = misses;
+    }
+
+    /// Makes [`Island::apply_delta`] note the largest kappa of the tets that the cuts of a frame create, and if wanted
+    /// that of all tets before the first cut, which is O(tets).
+    pub(crate) fn note_kappa(&mut self, before: bool) {
+        if self.judged.cut_kappa.is_none() {
+            self.judged.cut_kappa = Some(CutKappa {
+                before: before.then(|| self.kappa()),
+                new_tets: 0.0,
+            });
+        }
+    }
+
+    /// The largest kappa of a tet, had none been softened. O(tets).
+    pub(crate) fn kappa(&self) -> f64 {
+        each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
+    }
+}
