@@ -4,6 +4,7 @@ mod array;
 pub mod coloring;
 mod context;
 mod error;
+mod index;
 mod kernel;
 mod shaders;
 mod solver;

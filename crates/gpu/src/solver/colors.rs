@@ -9,6 +9,7 @@
 use incise_graph::Rows;
 
 use crate::array::Array;
+use crate::index::index;
 use crate::kernel::{Recorder, STRIDE};
 use crate::{GpuContext, GpuError};
 
@@ -126,10 +127,6 @@ fn range(ranges: &mut Vec<u32>, first: usize, count: usize) -> u32 {
     ranges.extend_from_slice(bytemuck::cast_slice(&[range]));
     ranges.resize((offset + STRIDE) as usize / size_of::<u32>(), 0);
     offset
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 groups")
 }
 
 /// Numbers on the device with a copy on the host, so that only differences are sent.

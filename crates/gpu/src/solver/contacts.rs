@@ -17,6 +17,7 @@ use super::gpu_types::ContactUniform;
 use super::kernels::{BoundKernel, CLEAR, Kernels, SOLVE_CONTACTS, SOLVE_CONTACTS_TAIL, Variant};
 use super::layout::THREADS;
 use crate::array::{Array, Copy};
+use crate::index::index;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
@@ -341,8 +342,4 @@ impl ContactKernels<'_> {
     pub(crate) fn solve(&self, pass: &mut Recorder<'_>) {
         self.colors.run(pass, &self.one, &self.several);
     }
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 contacts")
 }

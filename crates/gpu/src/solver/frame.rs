@@ -24,6 +24,7 @@ use super::scalar_constraints::ScalarKernels;
 use super::shared::Shared;
 use super::stages::{Clock, Stage::*, Track};
 use crate::array::{Array, Copy};
+use crate::index::index;
 use crate::{GpuContext, GpuError};
 
 /// Data of a step beside the body.
@@ -432,8 +433,4 @@ impl Frame {
             contacts,
         })
     }
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("particles and slots are numbered by 32 bits")
 }

@@ -15,6 +15,7 @@ use super::gpu_types::TetPatch;
 use super::slots::{Moved, Slots};
 use super::tile::{self, Tile};
 use crate::GpuError;
+use crate::index::index;
 
 /// Threads of a workgroup, and tets whose numbers are adjacent in memory.
 pub(crate) const THREADS: usize = 64;
@@ -311,8 +312,4 @@ fn filled_in(tet_slot: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
 )]
 pub(crate) fn slope([ratio, gamma, _]: [f32; 3]) -> f32 {
     (1.0 + f64::from(ratio) * (1.0 - f64::from(gamma))) as f32
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 tet_slots")
 }

@@ -12,6 +12,7 @@ use super::colors::Colors;
 use super::kernels::{BoundKernel, CLEAR, Kernels, Kind, Variant, solve_scalars};
 use super::layout::THREADS;
 use crate::array::Array;
+use crate::index::index;
 use crate::kernel::Recorder;
 use crate::{GpuContext, GpuError};
 
@@ -197,8 +198,4 @@ impl ScalarKernels<'_> {
     pub(crate) fn solve(&self, pass: &mut Recorder<'_>) {
         self.colors.run(pass, &self.one, &self.several);
     }
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 constraints")
 }

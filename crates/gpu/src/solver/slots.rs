@@ -3,6 +3,7 @@
 //! A workgroup solves a group of slots. A cluster has a slot while it has tets, and keeps it while its color stays.
 //! Cost: O(changed clusters times groups of their colors / 64) for an update, O(clusters) to build.
 
+use crate::index::index;
 use incise_graph::{ClusterId, Lanes, Rows, Schedule};
 
 /// The cluster of an empty slot.
@@ -151,10 +152,6 @@ impl Slots {
         self.assigned += 1;
         index(slot)
     }
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("fewer than 2^32 slots")
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! Tets of one step share no particle. Steps are assigned by first fit in ascending order, with a bit for each step at
 //! each particle, and equal those of `incise_coloring::color_within_clusters`. Cost: O(tets log tets).
 
+use crate::index::index;
 /// Capacities of tiles in tets. The particles of the largest, if its tets share none, fill the 16 KiB of workgroup
 /// memory that WebGPU guarantees.
 const ROOMS: [usize; 3] = [64, 128, 256];
@@ -97,10 +98,6 @@ impl Tile {
         particles[..self.particles.len()].copy_from_slice(&self.particles);
         numbers
     }
-}
-
-fn index(value: usize) -> u32 {
-    u32::try_from(value).expect("a tile is small")
 }
 
 #[cfg(test)]
