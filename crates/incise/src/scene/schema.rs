@@ -23,7 +23,17 @@ pub fn schema() -> Value {
     let generator = SchemaSettings::draft07().into_generator();
     let mut schema = generator.into_root_schema_for::<Scene>();
     RecursiveTransform(without_null).transform(&mut schema);
+    RecursiveTransform(without_example).transform(&mut schema);
     schema.to_value()
+}
+
+/// Removes the example from a description: it shows the struct in Rust, not the file.
+fn without_example(schema: &mut Schema) {
+    if let Some(Value::String(text)) = schema.get_mut("description")
+        && let Some(end) = text.find("\n\n```")
+    {
+        text.truncate(end);
+    }
 }
 
 /// Removes the alternative `null` from a schema.

@@ -361,7 +361,7 @@ proptest! {
         keeps_momentum(bodies, &acts, builder(Method::GaussSeidel, precision, 8), tolerance);
     }
 
-    /// VBD keeps momentum as far as its sweeps converge.
+    /// VBD keeps momentum to the error that its sweeps leave.
     #[test]
     fn vbd_goes_on_through_joins((bodies, acts) in acts_of_free_bodies(), two_level in any::<bool>()) {
         let solver = SolverSpec::of(Method::Vbd).with(|spec| {
