@@ -200,15 +200,6 @@ impl<T: Copy> Rows<T> {
         Some(value)
     }
 
-    /// Empties a row. O(1).
-    ///
-    /// # Panics
-    /// If there is no such row.
-    pub fn clear_row(&mut self, row: usize) {
-        self.held -= self.spans[row].length as usize;
-        self.spans[row].length = 0;
-    }
-
     /// Closes all holes if they exceed the limit; returns the number of values moved. Call it after
     /// a number of edits. Amortized O(1) for each of them.
     pub fn tidy(&mut self) -> usize {

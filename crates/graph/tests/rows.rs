@@ -11,7 +11,6 @@ enum Edit {
     Remove(usize),
     SwapRemove(usize),
     Pop,
-    Clear,
     Resize(usize),
 }
 
@@ -22,7 +21,6 @@ fn edit() -> impl Strategy<Value = (usize, Edit)> {
         2 => any::<usize>().prop_map(Edit::Remove),
         2 => any::<usize>().prop_map(Edit::SwapRemove),
         1 => Just(Edit::Pop),
-        1 => Just(Edit::Clear),
         1 => (0usize..8).prop_map(Edit::Resize),
     ];
     (any::<usize>(), edit)
@@ -71,10 +69,6 @@ proptest! {
                     prop_assert_eq!(rows.swap_remove(row, at), list.swap_remove(at));
                 }
                 Edit::Pop => prop_assert_eq!(rows.pop(row), list.pop()),
-                Edit::Clear => {
-                    rows.clear_row(row);
-                    list.clear();
-                }
                 _ => {}
             }
             rows.tidy();
