@@ -21,10 +21,11 @@ use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
 use crate::ContactError;
+use crate::face::FaceContact;
 use crate::index::{NONE, index};
 use crate::normals::Shape;
 use crate::pairs::{FreshPairs, PairContact};
-use crate::query::{FaceContact, Found, Query};
+use crate::query::{Found, Query};
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};

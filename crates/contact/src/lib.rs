@@ -56,6 +56,7 @@
 
 mod detector;
 mod error;
+mod face;
 mod index;
 mod normals;
 mod pairs;
@@ -68,8 +69,8 @@ mod walk;
 
 pub use detector::{ContactDetector, ContactUpdate};
 pub use error::ContactError;
+pub use face::{FaceContact, FaceLimit};
 pub use pairs::{FreshPairs, PairContact};
-pub use query::FaceContact;
 pub use settings::{BodyPairs, ContactSettings};
 pub use state::ContactState;
 pub use surface::ContactSurface;

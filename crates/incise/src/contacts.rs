@@ -16,11 +16,11 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
-use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState, ContactSurface};
+use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
 use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
 use incise_graph::{Coloring, Incidence};
 use incise_mesh::{ParticleId, closest_on_triangle};
-use incise_xpbd::{ContactLaw, FaceContact, PairContact};
+use incise_xpbd::{ContactLaw, FaceContact, FaceLimit, PairContact};
 
 use crate::backend::{AnySolver, each, each_mut};
 use crate::report::{ContactCounts, milliseconds};
@@ -40,15 +40,11 @@ const DEEP: f64 = 0.1;
 /// For how long it has to: s, and recovery times, within which an overlap of the start has parted.
 const DEEP_TIME: f64 = 0.25;
 const RECOVERIES: f64 = 5.0;
-/// The sine of the angle between two triangles from which the edge between them counts as convex.
-const FLAT: f64 = 1e-3;
-/// The cosine between the normals of two triangles below which they face each other, and that above which they do not.
-const FACES: f64 = -0.3;
-const FACES_NOT: f64 = -0.1;
 /// A place in the list of contacts.
 const NO_CONTACT: FaceContact = FaceContact {
     particles: [0; 4],
     beyond: None,
+    limit: None,
     thickness: 0.0,
 };
 
@@ -337,17 +333,19 @@ impl Contacts {
                     self.thickness
                 }
             };
-            let (surface, positions) = (self.detector.surface(), &self.room.positions);
-            let reach = self.detector.reach();
             let mut changed = faces.len() != self.face_colors.vertex_count();
             self.faces.resize(faces.len(), NO_CONTACT);
             for (contact, out) in faces.iter().zip(&mut self.faces) {
-                let (particles, beyond) = planes(surface, positions, contact.particles, reach);
-                changed |= particles != out.particles;
+                changed |= contact.particles != out.particles;
+                let limit = contact.limit.map(|limit| FaceLimit {
+                    normal: limit.normal,
+                    distance: limit.distance,
+                });
                 *out = FaceContact {
-                    particles,
-                    beyond,
-                    thickness: thickness(particles),
+                    particles: contact.particles,
+                    beyond: contact.beyond,
+                    limit,
+                    thickness: thickness(contact.particles),
                 };
             }
             if changed {
@@ -543,82 +541,4 @@ fn colors<const K: usize>(
 ) -> Result<Coloring, Error> {
     let incidence = Incidence::from_constraints(particles, contacts)?;
     Ok(greedy(&incidence, Order::Natural))
-}
-
-/// A vertex and a triangle, turned so that the edge nearest to the vertex runs from the first corner to the second, and,
-/// if that edge is convex, the normal of the surface beyond it in the basis of the triangle.
-///
-/// Of the two surfaces, one that no triangle around the vertex faces cannot be what it meets, if the other one is faced:
-/// at the rim of a cut the vertices of one side meet the cut face of the other side and not its outer surface. Then the
-/// contact is with the other surface alone.
-fn planes(
-    surface: &ContactSurface,
-    positions: &[DVec3],
-    contact: [u32; 4],
-    reach: f64,
-) -> ([u32; 4], Option<[f64; 3]>) {
-    let at = |p: u32| positions[p as usize];
-    let [vertex, corners @ ..] = contact;
-    let [a, b, c] = corners.map(at);
-    let area = (b - a).cross(c - a);
-    // Of the edge opposite to each corner: the area of the triangle that it makes with the foot of the vertex.
-    let weight = |k: usize| {
-        let [from, to] = [1, 2].map(|step| at(corners[(k + step) % 3]));
-        (to - from).cross(at(vertex) - from).dot(area)
-    };
-    let weights = [0, 1, 2].map(weight);
-    let least = |least: usize, k: usize| {
-        if weights[k] < weights[least] {
-            k
-        } else {
-            least
-        }
-    };
-    let opposite = (1..3).fold(0, least);
-    let [p, q, r] = [1, 2, 3].map(|step| corners[(opposite + step) % 3]);
-    let turned = [vertex, p, q, r];
-    let mut others = surface.fan(ParticleId(p)).filter_map(|triangle| {
-        let numbers = triangle.particles.map(|p| p.0);
-        // Neighbors run along a common edge in opposite directions.
-        let k = (0..3).find(|&k| numbers[k] == q && numbers[(k + 1) % 3] == p)?;
-        Some(numbers[(k + 2) % 3])
-    });
-    let Some(other) = others.next() else {
-        return (turned, None);
-    };
-    let (x, e1, e2) = (at(p), at(q) - at(p), at(r) - at(p));
-    let way = at(other) - x;
-    // Convex: the other triangle bends away from the plane of this one.
-    let is_convex = area.dot(way) < -FLAT * area.length() * way.length();
-    let normals = [area.try_normalize(), way.cross(e1).try_normalize()];
-    let [Some(own), Some(normal)] = normals else {
-        return (turned, None);
-    };
-    if !is_convex {
-        return (turned, None);
-    }
-    let around = surface.fan(ParticleId(vertex)).filter_map(|triangle| {
-        let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
-        (b - a).cross(c - a).try_normalize()
-    });
-    let (mut to_own, mut to_other) = (1.0_f64, 1.0_f64);
-    for around in around {
-        to_own = to_own.min(around.dot(own));
-        to_other = to_other.min(around.dot(normal));
-    }
-    if to_own < FACES && to_other > FACES_NOT {
-        return (turned, None);
-    }
-    let is_near = || {
-        let closest = closest_on_triangle([at(q), at(p), at(other)], at(vertex)).point;
-        closest.distance(at(vertex)) <= reach
-    };
-    if to_other < FACES && to_own > FACES_NOT && other != vertex && is_near() {
-        return ([vertex, q, p, other], None);
-    }
-    // In the basis: the part along the area, and the rest by the normal equations of both edges.
-    let square = area.length_squared();
-    let second = e1.cross(normal).dot(area) / square;
-    let first = normal.cross(e2).dot(area) / square;
-    (turned, Some([first, second, normal.dot(area) / square]))
 }

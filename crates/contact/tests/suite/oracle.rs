@@ -9,8 +9,13 @@ use incise_mesh::{ParticleId, TetId, TrianglePart, closest_on_triangle, signed_v
 
 use crate::scene::Scene;
 
-/// A vertex and the corners of a triangle.
+/// A vertex and the corners of a triangle, the least of these first.
 pub(crate) type Key = [u32; 4];
+
+pub(crate) fn key_of([vertex, a, b, c]: [u32; 4]) -> Key {
+    let turned = [[vertex, a, b, c], [vertex, b, c, a], [vertex, c, a, b]];
+    turned.into_iter().min().unwrap()
+}
 
 /// What the slow search finds.
 #[derive(Default)]
@@ -120,6 +125,59 @@ impl Slow<'_> {
         }
     }
 
+    /// The contact with a triangle, or with the one beyond the nearest edge, if only that can be met.
+    fn key(&self, vertex: u32, fan: &[BoundaryTriangle], i: usize) -> Option<Key> {
+        let x = self.at(ParticleId(vertex));
+        let triangle = &self.triangles[i];
+        let (p, corners) = (triangle.particles, self.corners(triangle));
+        // How far inside of each side the foot of the vertex is, times the length of the side.
+        let inside = |k: usize| {
+            let along = corners[(k + 1) % 3] - corners[k];
+            self.normals[i].cross(along).dot(x - corners[k])
+        };
+        let sides = match closest_on_triangle(corners, x).part {
+            TrianglePart::Face => vec![0, 1, 2],
+            TrianglePart::Side(k) => vec![usize::from(k)],
+            TrianglePart::Corner(k) => vec![usize::from(k), usize::from(k + 2) % 3],
+        };
+        let nearest = |k: &usize, l: &usize| inside(*k).total_cmp(&inside(*l));
+        let k = sides.into_iter().min_by(nearest).unwrap();
+        let [from, to] = [p[k], p[(k + 1) % 3]];
+        let own = key_of([vertex, p[0].0, p[1].0, p[2].0]);
+        let beyond = (0..self.triangles.len()).find(|&j| {
+            let other = self.triangles[j].particles;
+            j != i && other.contains(&from) && other.contains(&to)
+        });
+        let Some(j) = beyond else { return Some(own) };
+        let other = self.triangles[j].particles;
+        let far = *other.iter().find(|c| **c != from && **c != to).unwrap();
+        let way = self.at(far) - self.at(from);
+        let faces = |normal: DVec3| {
+            let sound = fan.iter().filter(|t| self.is_sound(t));
+            let dots = sound.map(|t| self.area(t).normalize().dot(normal));
+            dots.fold(1.0, f64::min)
+        };
+        let (to_own, to_other) = (faces(self.normals[i]), faces(self.normals[j]));
+        let closest = closest_on_triangle(self.corners(&self.triangles[j]), x).point;
+        let is_swapped = self.normals[i].dot(way) < -1e-3 * way.length()
+            && to_own > -0.1
+            && to_other < -0.3
+            && far.0 != vertex
+            && closest.distance(x) <= self.scene.contacts.reach();
+        if !is_swapped {
+            return Some(own);
+        }
+        // A pair holds the vertex at the cut face that it was parted from.
+        let tag = self.triangles[j].tag;
+        let partners = self.partners.get(&vertex).into_iter().flatten();
+        let is_of_pair = |partner: &u32| {
+            let mut all = self.scene.body.boundary();
+            all.any(|t| t.tag == tag && t.particles.contains(&ParticleId(*partner)))
+        };
+        let is_held = partners.copied().any(|partner| is_of_pair(&partner));
+        (!is_held).then(|| key_of([vertex, other[0].0, other[1].0, other[2].0]))
+    }
+
     fn vertex(&self, vertex: u32, fan: &[BoundaryTriangle], expected: &mut Expected) {
         let x = self.at(ParticleId(vertex));
         let reach = self.scene.contacts.reach();
@@ -201,21 +259,30 @@ impl Slow<'_> {
                 outside.push((distance, i));
             }
         }
-        let key = |i: usize| {
-            let [a, b, c] = self.triangles[i].particles.map(|p| p.0);
-            [vertex, a, b, c]
-        };
+        let key = |i: usize| self.key(vertex, fan, i);
         outside.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
         expected
             .contacts
-            .extend(outside.iter().take(3).map(|o| key(o.1)));
+            .extend(outside.iter().take(3).filter_map(|o| key(o.1)));
 
         inside.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
         let touching = 0.01 * self.scene.contacts.mean_edge();
+        let ends = |closest: DVec3, around: &[usize], to: DVec3| {
+            let starts = around.iter().map(|&i| self.triangles[i].tet);
+            let ends = starts.flat_map(|tet| self.reached(tet, closest, to));
+            ends.collect::<Vec<TetId>>()
+        };
+        let is_own =
+            |tet: &TetId| self.scene.body.mesh().tets[tet.index()].contains(&ParticleId(vertex));
+        // The nearest with a way, if that is shallow.
         let valid = inside
             .iter()
             .take(8)
-            .find(|(distance, i, closest, around)| {
+            .find(|(_, _, closest, around)| {
+                let ends = ends(closest.point, around, x);
+                ends.iter().any(|tet| !is_own(tet))
+            })
+            .filter(|(distance, i, closest, around)| {
                 let normal = if closest.part == TrianglePart::Face || *distance <= touching {
                     self.normals[*i]
                 } else {
@@ -223,18 +290,10 @@ impl Slow<'_> {
                 };
                 let depth = normal.dot(closest.point - x);
                 let twice = closest.point - normal * (2.0 * depth);
-                let ends = |to: DVec3| {
-                    let starts = around.iter().map(|&i| self.triangles[i].tet);
-                    let ends = starts.flat_map(|tet| self.reached(tet, closest.point, to));
-                    ends.collect::<Vec<TetId>>()
-                };
-                let is_own = |tet: &TetId| {
-                    self.scene.body.mesh().tets[tet.index()].contains(&ParticleId(vertex))
-                };
-                !ends(twice).is_empty() && ends(x).iter().any(|tet| !is_own(tet))
+                !ends(closest.point, around, twice).is_empty()
             });
         if let Some((_, i, ..)) = valid {
-            expected.contacts.insert(key(*i));
+            expected.contacts.extend(key(*i));
             expected.inside.insert(vertex);
             return;
         }
@@ -318,7 +377,7 @@ fn barycentric(corners: [DVec3; 4], x: DVec3) -> [f64; 4] {
 /// The candidates of the detector.
 pub(crate) fn found(scene: &Scene) -> BTreeSet<Key> {
     let contacts = scene.contacts.faces().iter();
-    let found: BTreeSet<Key> = contacts.map(|contact| contact.particles).collect();
+    let found: BTreeSet<Key> = contacts.map(|contact| key_of(contact.particles)).collect();
     assert_eq!(found.len(), scene.contacts.faces().len(), "each once");
     found
 }

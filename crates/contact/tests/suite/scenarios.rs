@@ -3,6 +3,7 @@
 use glam::{DQuat, DVec3};
 use incise_contact::{BodyPairs, ContactDetector, ContactError, ContactSettings, FaceContact};
 use incise_mesh::{ParticleId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 
 use crate::oracle::compare;
 use crate::scene::{FRAME, Scene, jittered_box};
@@ -296,6 +297,136 @@ fn pushed_together_again() {
     }
 }
 
+/// A vertex that has passed the middle of a thin plate is pushed out through the wide face that it came in by, also if
+/// the narrow one at the rim faces it, too, and is less deep than half of the width there.
+#[test]
+fn a_thin_plate_is_left_by_the_nearest_way() {
+    let plate = kuhn_box([12, 4, 1], DVec3::new(1.2, 0.4, 0.02));
+    // A box that is turned so that its lowest corner points down and towards the rim at x = 0.
+    let mut spike = kuhn_box([1; 3], DVec3::splat(0.3));
+    let turn = DQuat::from_rotation_arc(
+        DVec3::ONE.normalize(),
+        DVec3::new(0.5, 0.0, 1.0).normalize(),
+    );
+    for x in &mut spike.positions {
+        *x = turn * *x + DVec3::new(0.05, 0.21, 0.02 - 0.012);
+    }
+    let mut scene = Scene::new(&[plate, spike], ContactSettings::default());
+    scene.update();
+    compare(&scene);
+    let tip = scene.positions.len() - 8;
+    let at = DVec3::new(0.05, 0.21, 0.008);
+    assert!(scene.positions[tip].distance(at) < 1e-12);
+    let of_tip = |contact: &&FaceContact| contact.particles[0] as usize == tip;
+    let contacts: Vec<_> = scene.contacts.faces().iter().filter(of_tip).collect();
+    let inside = contacts.iter().filter(|c| c.gap(&scene.positions) < 0.0);
+    let inside: Vec<_> = inside.map(|c| c.normal_at(&scene.positions)).collect();
+    assert_eq!(inside.len(), 1, "{contacts:?}");
+    assert!(inside[0].z > 0.999, "{inside:?}");
+}
+
+/// A way out through three thin layers of tets is found, although hundreds of tets are fewer steps away.
+#[test]
+fn the_nearest_way_out_of_thin_layers() {
+    let layers = kuhn_box([3, 3, 10], DVec3::new(3.0, 3.0, 0.5));
+    let probe = moved(
+        kuhn_box([8; 3], DVec3::splat(0.04)),
+        DVec3::new(1.4, 1.55, 0.33),
+    );
+    let mut scene = Scene::new(&[layers, probe], ContactSettings::default());
+    scene.update();
+    assert!(scene.contacts.reach() < 0.1, "no triangle is near");
+    assert_eq!((scene.contacts.deep(), scene.contacts.buried()), (386, 0));
+    let tops = scene.contacts.faces().iter();
+    let tops = tops.filter(|c| c.normal_at(&scene.positions).z > 0.999);
+    assert!(
+        tops.count() >= 386 - 17 * 8,
+        "all but those that only face downward"
+    );
+}
+
+/// Past the rim of what they rest on, vertices are not held by its plane, whatever part of the surface is closest to
+/// them: a plate lies over a box and its overhanging ends hang a little below the top of the box.
+#[test]
+fn past_a_rim_nothing_is_held() {
+    for shift in [0.0, 0.07, 0.31] {
+        let below = kuhn_box([3; 3], DVec3::ONE);
+        let plate = moved(
+            kuhn_box([12, 12, 1], DVec3::new(2.4, 2.4, 0.1)),
+            DVec3::new(-0.7 + shift, -0.7 + shift, 1.0),
+        );
+        let settings = ContactSettings {
+            skin: 1.0,
+            ..ContactSettings::default()
+        };
+        let mut scene = Scene::new(&[below, plate], settings);
+        for x in &mut scene.positions[64..] {
+            let over = |c: f64| (-c).max(c - 1.0).max(0.0);
+            x.z -= 0.1 * over(x.x).max(over(x.y)) + 1e-4;
+        }
+        let is_over =
+            |x: DVec3| x.x >= -1e-9 && x.x <= 1.0 + 1e-9 && x.y >= -1e-9 && x.y <= 1.0 + 1e-9;
+        let settled = scene.positions.clone();
+        // Found where they are, and found a little aside and then moved there without another search.
+        for aside in [
+            DVec3::ZERO,
+            DVec3::new(0.03, 0.02, 0.0),
+            DVec3::new(-0.04, 0.01, 0.0),
+        ] {
+            scene.positions.clone_from(&settled);
+            scene.shift(1, aside);
+            scene.search();
+            compare(&scene);
+            scene.positions.clone_from(&settled);
+            let (mut held, mut beside) = (0, 0);
+            for contact in scene.contacts.faces() {
+                let x = scene.positions[contact.particles[0] as usize];
+                if contact.particles[0] < 64 || contact.particles[1] >= 64 {
+                    continue;
+                }
+                let gap = contact.gap(&scene.positions);
+                // What touched the rim is held a quarter of an altitude past it.
+                let margin = if aside == DVec3::ZERO { 0.0 } else { 0.09 };
+                let near = x.clamp(DVec3::ZERO, DVec3::ONE).with_z(x.z);
+                if is_over(x) {
+                    held += usize::from(gap < 0.0);
+                } else if x.distance(near) > margin {
+                    beside += 1;
+                    assert!(gap > 0.0, "{x} is held: {gap} by {contact:?}");
+                }
+            }
+            assert!(held >= 16 && beside >= 8, "{held} held, {beside} beside");
+        }
+    }
+}
+
+/// Planes and limits turn with the triangle.
+#[test]
+fn contacts_turn_with_their_bodies() {
+    let ball = generate(Shape::Sphere, 800).unwrap();
+    let top = ball.positions.iter().fold(0.0_f64, |top, x| top.max(x.z));
+    let above = moved(ball.clone(), DVec3::new(0.3, 0.2, 1.95) * top);
+    let bodies = [ball, above];
+    let settings = ContactSettings {
+        skin: 1.0,
+        ..ContactSettings::default()
+    };
+    let mut scene = Scene::new(&bodies, settings);
+    scene.update();
+    let rest = scene.positions.clone();
+    let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 1.1);
+    let turned: Vec<DVec3> = rest.iter().map(|x| turn * *x + DVec3::X).collect();
+    let contacts = scene.contacts.faces();
+    for contact in contacts {
+        assert!((contact.gap(&turned) - contact.gap(&rest)).abs() < 1e-12);
+        let normal = turn * contact.normal_at(&rest);
+        assert!(contact.normal_at(&turned).distance(normal) < 1e-9);
+    }
+    let with = |has: &dyn Fn(&FaceContact) -> bool| contacts.iter().filter(|c| has(c)).count();
+    let counts = [with(&|c| c.beyond.is_some()), with(&|c| c.limit.is_some())];
+    assert!(counts.iter().all(|count| *count > 3), "{counts:?} of {}", contacts.len());
+}
+
 fn same(one: &ContactDetector, other: &ContactDetector) -> bool {
     one.faces() == other.faces() && one.pairs() == other.pairs() && one.deep() == other.deep()
 }
@@ -441,7 +572,7 @@ fn collapsed_and_inverted() {
         for contact in scene.contacts.faces() {
             assert!(contact.particles[1] < 64, "no triangle of it is touched");
             assert!(contact.gap(&scene.positions).is_finite());
-            assert!(contact.normal.iter().all(|c| c.is_finite()));
+            assert!(contact.normal_at(&scene.positions).is_finite());
         }
     }
     scene.positions[64..].fill(DVec3::new(0.5, 0.5, 1.0));

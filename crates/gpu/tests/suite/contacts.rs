@@ -6,8 +6,8 @@ use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuSolver};
 use incise_graph::{ColorId, Coloring, Incidence, Schedule};
 use incise_mesh::TetMesh;
 use incise_xpbd::{
-    Collider, ContactLaw, ContactState, FaceContact, Method, PairContact, Solver, StepSettings,
-    XpbdError,
+    Collider, ContactLaw, ContactState, FaceContact, FaceLimit, Method, PairContact, Solver,
+    StepSettings, XpbdError,
 };
 use proptest::prelude::*;
 
@@ -67,6 +67,14 @@ fn direction(seed: u64) -> DVec3 {
     dvec3(noise(seed), noise(seed + 1), noise(seed + 2)) - 0.5
 }
 
+/// A limit in a random direction.
+fn limit(seed: u64) -> FaceLimit {
+    FaceLimit {
+        normal: direction(seed).to_array(),
+        distance: 0.1 * noise(seed + 3),
+    }
+}
+
 /// Contacts between particles and triangles of a body picked at random: with and without a second plane, thick ones, and
 /// many on one vertex, which need a tail.
 fn random(mesh: &TetMesh, seed: u64, number: u32) -> List {
@@ -89,6 +97,7 @@ fn random(mesh: &TetMesh, seed: u64, number: u32) -> List {
             list.faces.push(FaceContact {
                 particles: [vertex, tet[0], tet[1], tet[2]],
                 beyond: (k % 300 == 0).then(|| n.to_array()),
+                limit: (k % 700 == 0).then(|| limit(seed + k + 30)),
                 thickness: if k % 500 == 0 { 0.02 } else { 0.0 },
             });
         }
@@ -302,6 +311,10 @@ fn degenerate_contacts() {
                 let face = FaceContact {
                     particles: [0, 1, 2, 3],
                     beyond,
+                    limit: beyond.map(|normal| FaceLimit {
+                        normal,
+                        distance: 0.1,
+                    }),
                     thickness: 0.0,
                 };
                 let pair = PairContact {
@@ -373,7 +386,9 @@ proptest! {
             particles.sort_unstable();
             if particles.windows(2).all(|two| two[0] < two[1]) {
                 let beyond = (k % 2 == 0).then(|| direction(seed + 90 + k).to_array());
-                list.faces.push(FaceContact { particles, beyond, thickness: 0.01 * (k % 3) as f64 });
+                let limit = (k % 3 == 0).then(|| limit(seed + 95 + k));
+                let thickness = 0.01 * (k % 3) as f64;
+                list.faces.push(FaceContact { particles, beyond, limit, thickness });
             }
         }
         let [device, host] = both(gpu, || dust(&positions, &[2], &list));

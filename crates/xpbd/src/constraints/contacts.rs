@@ -2,13 +2,20 @@
 //!
 //! A contact is a linear combination of particles along a normal, `C = n · Σ sₖ xₖ - h ≥ 0` with `Σ sₖ = 0`: a vertex
 //! against the point below it on a triangle, or a particle against its partner on the other side of a fresh cut. The
-//! point on the triangle is found in each solve: the foot of the vertex, kept inside of the triangle with its sides
-//! moved outward by a quarter.
+//! point on the triangle is found in each solve: the foot of the vertex in the plane of the triangle. Where the foot lies
+//! beyond a side by more than a quarter of the altitude, a point on the sides moved outward by a quarter takes its place:
+//! weights below -1/4 become -1/4, and the others shrink towards -1/4 in proportion until the sum is 1 again. That point
+//! is not the closest one, which would need a distinction of cases; it decides how the force is distributed, and it does
+//! not change `C`, since all of the plane has the same distance.
 //!
 //! Near a convex edge a vertex is outside if it is outside of one of both surfaces that meet there. So a contact may
 //! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that takes
 //! less to satisfy. With one plane only, or with a normal in between, a vertex of a floor catches the front of a block
 //! that slides over it. The normal of the second plane is given in the basis of the triangle, so it turns with it.
+//!
+//! A plane has no end, a surface has: past a rim a vertex would be held where there is nothing below it. So a contact may
+//! have a limit, a direction away from the nearest edge and a distance along it beyond which the vertex touches nothing.
+//! A limit only opens a contact, it never presses.
 //!
 //! What the substep adds to the overlap is stopped in full; the overlap that was there at its start is taken back over
 //! a recovery time τ: `C̃ = C - α min(C₀, 0)` with `1 - α = min(1, Δt/τ)`. So an overlap parts at its depth over τ, and
@@ -66,6 +73,17 @@ pub struct PairContact {
     pub normal: DVec3,
 }
 
+/// Where the surface of a contact ends. See [`FaceContact::limit`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FaceLimit {
+    /// The direction away from the surface, of any length but 0, as coefficients of the edges `e₁ = x₂ - x₁` and
+    /// `e₂ = x₃ - x₁` of the triangle and of `e₁ × e₂`.
+    pub normal: [f64; 3],
+    /// How far in m along the direction the contact goes beyond the edge from the first corner to the second, at least 0.
+    pub distance: f64,
+}
+
 /// A vertex that stays on the outer side of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -76,6 +94,9 @@ pub struct FaceContact {
     /// length but 0, as coefficients of the edges `e₁ = x₂ - x₁` and `e₂ = x₃ - x₁` and of `e₁ × e₂`. A vertex on the
     /// outer side of that plane through the edge touches nothing.
     pub beyond: Option<[f64; 3]>,
+    /// Where the surface ends near the edge from the first corner to the second: a vertex whose way from the closest point
+    /// of that edge goes further in this direction touches nothing. Without a limit the plane goes on forever.
+    pub limit: Option<FaceLimit>,
     /// The distance that is kept in m, at least 0.
     pub thickness: f64,
 }
@@ -102,9 +123,9 @@ pub struct ContactState {
 pub struct ContactData<R> {
     /// The particles: the two of a pair and twice [`u32::MAX`], or a vertex and the corners of a triangle.
     pub particles: [u32; 4],
-    /// Of a pair the unit normal and 0; of a vertex and a triangle [`FaceContact::beyond`], three zeros where there is
-    /// none, and the thickness.
-    pub numbers: [R; 4],
+    /// Of a pair the unit normal and zeros; of a vertex and a triangle [`FaceContact::beyond`] and the thickness, then
+    /// [`FaceContact::limit`]. Three zeros stand for a direction that there is none of.
+    pub numbers: [R; 8],
 }
 
 /// Contacts that a kernel solves together: a color, or a tail. See [`crate::Solver::contact_rounds`].
@@ -157,13 +178,31 @@ fn unit<R: Float>(index: usize, normal: DVec3) -> Result<R::Vector, XpbdError> {
     Ok(R::from_dvec3(unit))
 }
 
-/// A contact of `K` particles at the present positions.
-struct Gap<R: Float, const K: usize> {
+/// A plane of a contact of `K` particles at the present positions.
+#[derive(Clone, Copy)]
+struct ContactPlane<R: Float, const K: usize> {
     normal: R::Vector,
-    /// `C` without the part of an old overlap that the substep leaves.
-    residual: R,
     /// The gradient at each particle is the normal times this; their sum is 0.
     shares: [R; K],
+    /// Whether it is the second plane of the contact.
+    is_second: bool,
+}
+
+/// A contact of `K` particles at the present positions.
+#[derive(Clone, Copy)]
+struct Gap<R: Float, const K: usize> {
+    /// The plane that it acts along.
+    plane: ContactPlane<R, K>,
+    /// `C` without the part of an old overlap that the substep leaves.
+    residual: R,
+    /// Whether the vertex is past the end of the surface, so that there is no contact whatever `C` says.
+    is_past: bool,
+}
+
+impl<R: Float, const K: usize> Gap<R, K> {
+    fn is_open(&self) -> bool {
+        self.is_past || self.residual >= R::ZERO
+    }
 }
 
 /// A contact in the solver's precision.
@@ -172,6 +211,8 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
     /// triangle has no normal.
     fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
+    /// The first or the second plane; `None` where a triangle has no normal.
+    fn plane(&self, x: [R::Vector; K], is_second: bool) -> Option<ContactPlane<R, K>>;
     /// Whether the first particle is above or below the other side, not beside it.
     fn faces(&self, x: [R::Vector; K]) -> bool;
 }
@@ -191,6 +232,9 @@ struct Face<R: Float> {
     particles: [u32; 4],
     /// Zeros where there is none.
     beyond: [R; 3],
+    /// Zeros where there is none.
+    limit: [R; 3],
+    distance: R,
     thickness: R,
 }
 
@@ -216,17 +260,26 @@ impl<R: Float> Face<R> {
         if !(contact.thickness.is_finite() && contact.thickness >= 0.0) {
             return refuse("thickness", contact.thickness, "at least 0 and finite");
         }
-        let beyond = contact.beyond.map_or([R::ZERO; 3], |n| n.map(R::from_f64));
-        let is_none = beyond == [R::ZERO; 3];
-        if !beyond.iter().all(|n| n.is_finite()) || (contact.beyond.is_some() && is_none) {
-            let length = contact
-                .beyond
-                .map_or(0.0, |n| DVec3::from_array(n).length());
-            return refuse("normal", length, "a direction");
+        let limit = contact.limit.map(|limit| limit.normal);
+        let distance = contact.limit.map_or(0.0, |limit| limit.distance);
+        if !(distance.is_finite() && distance >= 0.0) {
+            return refuse("limit distance", distance, "at least 0 and finite");
         }
+        let mut directions = [[R::ZERO; 3]; 2];
+        for (given, out) in [contact.beyond, limit].into_iter().zip(&mut directions) {
+            let Some(normal) = given else { continue };
+            *out = normal.map(R::from_f64);
+            if !out.iter().all(|n| n.is_finite()) || *out == [R::ZERO; 3] {
+                let length = DVec3::from_array(normal).length();
+                return refuse("normal", length, "a direction");
+            }
+        }
+        let [beyond, limit] = directions;
         Ok(Self {
             particles: contact.particles,
             beyond,
+            limit,
+            distance: R::from_f64(distance),
             thickness: R::from_f64(contact.thickness),
         })
     }
@@ -242,14 +295,98 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
         let value = R::dot(self.normal, x[1] - x[0]);
         let before = R::dot(self.normal, previous[1] - previous[0]);
         Some(Gap {
-            normal: self.normal,
+            plane: self.plane(x, false)?,
             residual: new_part(value, before, kept),
+            is_past: false,
+        })
+    }
+
+    #[inline]
+    fn plane(&self, _x: [R::Vector; 2], is_second: bool) -> Option<ContactPlane<R, 2>> {
+        Some(ContactPlane {
+            normal: self.normal,
             shares: [-R::ONE, R::ONE],
+            is_second,
         })
     }
 
     fn faces(&self, _x: [R::Vector; 2]) -> bool {
         true
+    }
+}
+
+/// Both edges from the first corner of a triangle, and the vertex from there.
+type Basis<R> = [<R as Float>::Vector; 3];
+
+fn basis<R: Float>(x: [R::Vector; 4]) -> Basis<R> {
+    [x[2] - x[1], x[3] - x[1], x[0] - x[1]]
+}
+
+/// A vector from its coefficients in the basis of a triangle with this area vector.
+#[inline]
+fn combined<R: Float>([e1, e2, _]: Basis<R>, area: R::Vector, [a, b, c]: [R; 3]) -> R::Vector {
+    e1 * a + e2 * b + area * c
+}
+
+fn clamped<R: Float>(x: R, low: R, high: R) -> R {
+    let x = if x < low { low } else { x };
+    if x > high { high } else { x }
+}
+
+impl<R: Float> Face<R> {
+    /// The plane of the triangle.
+    #[inline]
+    fn own_plane(&self, [e1, e2, r]: Basis<R>) -> Option<ContactPlane<R, 4>> {
+        let area = R::cross(e1, e2);
+        // The normal, scaled by hand: squares of areas leave the range of single precision.
+        let (size, normal) = direction::<R>(area)?;
+        let [second, third] = inside(
+            R::dot(R::cross(r, e2), normal) / size,
+            R::dot(R::cross(e1, r), normal) / size,
+        )?;
+        Some(ContactPlane {
+            normal,
+            shares: [R::ONE, second + third - R::ONE, -second, -third],
+            is_second: false,
+        })
+    }
+
+    /// The plane beyond the edge from the first corner to the second.
+    fn plane_beyond(&self, basis: Basis<R>) -> Option<ContactPlane<R, 4>> {
+        if self.beyond == [R::ZERO; 3] {
+            return None;
+        }
+        let [e1, e2, r] = basis;
+        let (_, normal) = direction::<R>(combined(basis, R::cross(e1, e2), self.beyond))?;
+        let (length, along) = direction::<R>(e1)?;
+        let (low, high) = (R::from_f64(-MARGIN), R::from_f64(1.0 + MARGIN));
+        let part = clamped(R::dot(r, along) / length, low, high);
+        Some(ContactPlane {
+            normal,
+            shares: [R::ONE, part - R::ONE, -part, R::ZERO],
+            is_second: true,
+        })
+    }
+
+    /// Whether the vertex is past the end of the surface.
+    fn is_past(&self, basis: Basis<R>) -> bool {
+        if self.limit == [R::ZERO; 3] {
+            return false;
+        }
+        let [e1, e2, r] = basis;
+        let outward = direction::<R>(combined(basis, R::cross(e1, e2), self.limit));
+        let (Some((_, outward)), Some((length, along))) = (outward, direction::<R>(e1)) else {
+            return false;
+        };
+        let part = clamped(R::dot(r, along) / length, R::ZERO, R::ONE);
+        R::dot(outward, r - e1 * part) > self.distance + self.thickness
+    }
+
+    /// The distance of the vertex from a plane, less the thickness.
+    #[inline]
+    fn above(&self, plane: &ContactPlane<R, 4>, [e1, e2, r]: Basis<R>) -> R {
+        let [_, _, second, third] = plane.shares;
+        R::dot(plane.normal, r + e1 * second + e2 * third) - self.thickness
     }
 }
 
@@ -260,53 +397,37 @@ impl<R: Float> Contact<R, 4> for Face<R> {
 
     #[inline]
     fn gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
-        let basis = |x: [R::Vector; 4]| (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
-        let ((e1, e2, r), old) = (basis(x), basis(previous));
-        let area = R::cross(e1, e2);
-        // The normal, scaled by hand: squares of areas leave the range of single precision.
-        let (size, normal) = direction::<R>(area)?;
-        let [second, third] = inside(
-            R::dot(R::cross(r, e2), normal) / size,
-            R::dot(R::cross(e1, r), normal) / size,
-        )?;
-        let residual = |normal: R::Vector, [second, third]: [R; 2]| {
-            let above = |(e1, e2, r): (R::Vector, R::Vector, R::Vector)| {
-                R::dot(normal, r - e1 * second - e2 * third) - self.thickness
-            };
-            new_part(above((e1, e2, r)), above(old), kept)
+        let (now, old) = (basis::<R>(x), basis::<R>(previous));
+        let at = |plane: ContactPlane<R, 4>| Gap {
+            residual: new_part(self.above(&plane, now), self.above(&plane, old), kept),
+            plane,
+            is_past: false,
         };
-        let mut gap = Gap {
-            normal,
-            residual: residual(normal, [second, third]),
-            shares: [R::ONE, second + third - R::ONE, -second, -third],
-        };
-        let [a, b, c] = self.beyond;
-        if gap.residual >= R::ZERO || self.beyond == [R::ZERO; 3] {
+        let gap = at(self.own_plane(now)?);
+        if gap.is_open() {
             return Some(gap);
         }
-        let Some((_, normal)) = direction::<R>(e1 * a + e2 * b + area * c) else {
-            return Some(gap);
+        let beyond = self.plane_beyond(now).map(at);
+        let mut gap = match beyond {
+            Some(beyond) if beyond.residual > gap.residual => beyond,
+            _ => gap,
         };
-        let Some((length, along)) = direction::<R>(e1) else {
-            return Some(gap);
-        };
-        let (low, high) = (R::from_f64(-MARGIN), R::from_f64(1.0 + MARGIN));
-        let part = R::dot(r, along) / length;
-        let part = if part < low { low } else { part };
-        let part = if part > high { high } else { part };
-        let beyond = residual(normal, [part, R::ZERO]);
-        if beyond > gap.residual {
-            gap = Gap {
-                normal,
-                residual: beyond,
-                shares: [R::ONE, part - R::ONE, -part, R::ZERO],
-            };
-        }
+        gap.is_past = !gap.is_open() && self.is_past(now);
         Some(gap)
     }
 
+    #[inline]
+    fn plane(&self, x: [R::Vector; 4], is_second: bool) -> Option<ContactPlane<R, 4>> {
+        let basis = basis::<R>(x);
+        if is_second {
+            self.plane_beyond(basis)
+        } else {
+            self.own_plane(basis)
+        }
+    }
+
     fn faces(&self, x: [R::Vector; 4]) -> bool {
-        let (e1, e2, r) = (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
+        let [e1, e2, r] = basis::<R>(x);
         let Some((size, normal)) = direction::<R>(R::cross(e1, e2)) else {
             return false;
         };
@@ -329,8 +450,9 @@ fn new_part<R: Float>(value: R, before: R, kept: R) -> R {
     }
 }
 
-/// The weights of the second and the third corner of a triangle that has been grown by [`MARGIN`], for those of a point
-/// in its plane; `None` for what is no number.
+/// The weights of the second and the third corner for those of a point in the plane of a triangle: unchanged inside of the
+/// triangle with its sides moved outward by [`MARGIN`] altitudes, otherwise of a point on those sides. `None` for what is
+/// no number.
 #[inline]
 fn inside<R: Float>(second: R, third: R) -> Option<[R; 2]> {
     let margin = R::from_f64(MARGIN);
@@ -341,7 +463,7 @@ fn inside<R: Float>(second: R, third: R) -> Option<[R; 2]> {
     if weights.iter().all(|w| *w >= -margin) {
         return Some([second, third]);
     }
-    // Measured from the grown sides, what lies beyond a side goes onto it.
+    // Weights measured from the grown sides: what lies beyond a side goes onto it, the others keep their ratio.
     let [a, b, c] = weights.map(|w| if w > -margin { w + margin } else { R::ZERO });
     let scale = (R::ONE + margin + margin + margin) / (a + b + c);
     Some([b * scale - margin, c * scale - margin])
@@ -536,19 +658,19 @@ impl<R: Float> Contacts<R> {
 
     /// All contacts as plain numbers, in solving order.
     pub(crate) fn data(&self) -> impl Iterator<Item = ContactData<R>> + '_ {
-        let none = u32::MAX;
+        let (none, o) = (u32::MAX, R::ZERO);
         let pairs = self.pairs.iter().map(move |pair| {
             let ([a, b], [x, y, z]) = (pair.particles, R::components(pair.normal));
             ContactData {
                 particles: [a, b, none, none],
-                numbers: [x, y, z, R::ZERO],
+                numbers: [x, y, z, o, o, o, o, o],
             }
         });
         let faces = self.faces.iter().map(|face| {
-            let [a, b, c] = face.beyond;
+            let ([a, b, c], [d, e, f]) = (face.beyond, face.limit);
             ContactData {
                 particles: face.particles,
-                numbers: [a, b, c, face.thickness],
+                numbers: [a, b, c, face.thickness, d, e, f, face.distance],
             }
         });
         pairs.chain(faces)
@@ -615,7 +737,7 @@ impl<R: Float> Contacts<R> {
         let gap = contact.gap(x, x, R::ZERO);
         let mut depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
         // Below the plane of a triangle but beside the triangle, a vertex is not inside.
-        if !contact.faces(x) {
+        if gap.is_some_and(|gap| gap.is_past) || !contact.faces(x) {
             depth = depth.min(0.0);
         }
         let [x, y, z, normal] = self
@@ -642,24 +764,55 @@ impl<R: Float> Contacts<R> {
     ) {
         let numbers = contact.particles();
         let cells = numbers.map(|p| &particles.cells[p as usize]);
-        let x = cells.map(|cell| load::<R>(cell));
+        let mut x = cells.map(|cell| load::<R>(cell));
         let previous = numbers.map(|p| particles.previous[p as usize]);
-        let Some(gap) = contact.gap(x, previous, factors.kept) else {
+        let Some(mut gap) = contact.gap(x, previous, factors.kept) else {
             return;
         };
-        let residual = gap.residual;
         let multiplier = self.multipliers.get(index);
-        let [hx, hy, hz, before] = multiplier.map_or([R::ZERO; 4], R::read);
+        let [hx, hy, hz, signed] = multiplier.map_or([R::ZERO; 4], R::read);
+        let was_second = signed < R::ZERO;
+        let mut before = if was_second { -signed } else { signed };
+        let mut friction = R::vector(hx, hy, hz);
         // Open, and no impulse to take back.
-        if !(residual < R::ZERO || before > R::ZERO) {
+        if gap.is_open() && !(before > R::ZERO) {
+            return;
+        }
+        if !gap.residual.is_finite() {
             return;
         }
         let weights = cells.map(|cell| weight::<R>(cell));
+        if before > R::ZERO && (gap.is_past || gap.plane.is_second != was_second) {
+            // What pressed along another plane, or on a surface that has ended, is taken back where it acted.
+            let Some(plane) = contact.plane(x, was_second) else {
+                return;
+            };
+            let impulse = -(plane.normal * before + friction);
+            if !self.push(
+                index,
+                numbers,
+                &mut x,
+                particles,
+                plane.shares,
+                (impulse, -before),
+            ) {
+                return;
+            }
+            (before, friction) = (R::ZERO, R::Vector::default());
+            if let Some(multiplier) = multiplier {
+                R::write(multiplier, [R::ZERO; 4]);
+            }
+            match contact.gap(x, previous, factors.kept) {
+                Some(now) if !now.is_open() => gap = now,
+                _ => return,
+            }
+        }
+        let plane = gap.plane;
         let mut sum = R::ZERO;
-        for (&weight, &share) in weights.iter().zip(&gap.shares) {
+        for (&weight, &share) in weights.iter().zip(&plane.shares) {
             sum += weight * share * share;
         }
-        let mut change = -(residual / sum);
+        let mut change = -(gap.residual / sum);
         if before + change < R::ZERO {
             change = -before;
         }
@@ -668,14 +821,13 @@ impl<R: Float> Contacts<R> {
             return;
         }
         let pressure = before + change;
-        let mut impulse = gap.normal * change;
-        let mut friction = R::vector(hx, hy, hz);
+        let mut impulse = plane.normal * change;
         if factors.friction > R::ZERO {
             let mut slide = R::Vector::default();
             for k in 0..K {
-                slide += (x[k] - previous[k]) * gap.shares[k];
+                slide += (x[k] - previous[k]) * plane.shares[k];
             }
-            slide = slide - gap.normal * R::dot(gap.normal, slide);
+            slide = slide - plane.normal * R::dot(plane.normal, slide);
             let mut wanted = friction - slide * (R::ONE / sum);
             let (length, limit) = (R::dot(wanted, wanted).sqrt(), factors.friction * pressure);
             if length > limit {
@@ -684,26 +836,54 @@ impl<R: Float> Contacts<R> {
             impulse += wanted - friction;
             friction = wanted;
         }
-        if !R::components(impulse).into_iter().all(R::is_finite) {
+        if !self.push(
+            index,
+            numbers,
+            &mut x,
+            particles,
+            plane.shares,
+            (impulse, change),
+        ) {
             return;
-        }
-        for k in 0..K {
-            store::<R>(cells[k], x[k] + impulse * (weights[k] * gap.shares[k]));
-        }
-        if particles.keeps_refused() {
-            for (&particle, &share) in numbers.iter().zip(&gap.shares) {
-                particles.refuse(particle, impulse * share);
-            }
         }
         if let Some(multiplier) = multiplier {
             let [x, y, z] = R::components(friction);
-            R::write(multiplier, [x, y, z, pressure]);
+            // Its sign tells the plane.
+            let signed = if plane.is_second { -pressure } else { pressure };
+            R::write(multiplier, [x, y, z, signed]);
+        }
+    }
+
+    /// Moves the particles of a contact by an impulse along a plane and adds it up, unless it is out of range.
+    #[inline]
+    fn push<const K: usize>(
+        &self,
+        index: usize,
+        numbers: [u32; K],
+        x: &mut [R::Vector; K],
+        particles: &Particles<R>,
+        shares: [R; K],
+        (impulse, change): (R::Vector, R),
+    ) -> bool {
+        if !R::components(impulse).into_iter().all(R::is_finite) {
+            return false;
+        }
+        for k in 0..K {
+            let cell = &particles.cells[numbers[k] as usize];
+            x[k] += impulse * (weight::<R>(cell) * shares[k]);
+            store::<R>(cell, x[k]);
+        }
+        if particles.keeps_refused() {
+            for (&particle, &share) in numbers.iter().zip(&shares) {
+                particles.refuse(particle, impulse * share);
+            }
         }
         if let Some(total) = self.impulses.get(index) {
             let [x, y, z, normal] = R::read(total);
             let [dx, dy, dz] = R::components(impulse);
             R::write(total, [x + dx, y + dy, z + dz, normal + change]);
         }
+        true
     }
 }
 

@@ -359,7 +359,7 @@ impl<R: Float> Solver<R> {
     /// let at = [dvec3(0.2, 0.2, 0.1), DVec3::ZERO, DVec3::X, DVec3::Y];
     /// let mut solver = Solver::<f64>::new(&at);
     /// solver.set_mass(0, 2.0); // the corners have none and stay
-    /// let contact = FaceContact { particles: [0, 1, 2, 3], beyond: None, thickness: 0.0 };
+    /// let contact = FaceContact { particles: [0, 1, 2, 3], beyond: None, limit: None, thickness: 0.0 };
     /// let law = ContactLaw { friction: 0.3, recovery_time: 0.02 };
     /// let (none, one) = (Coloring::new(vec![]), Coloring::new(vec![ColorId(0)]));
     /// let settings = StepSettings { substeps: 10, gravity: Some(DVec3::NEG_Z * 9.81), ..StepSettings::new(0.016) };

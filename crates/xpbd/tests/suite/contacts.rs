@@ -4,8 +4,8 @@ use glam::{DQuat, DVec3, dvec3};
 use incise_coloring::{Order, greedy};
 use incise_graph::{ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{
-    ContactLaw, FaceContact, Method, PairContact, Real, Solver, StepSettings, VbdSettings,
-    VertexStars, XpbdError,
+    ContactLaw, FaceContact, FaceLimit, Method, PairContact, Real, Solver, StepSettings,
+    VbdSettings, VertexStars, XpbdError,
 };
 use proptest::prelude::*;
 
@@ -21,6 +21,7 @@ fn face(particles: [u32; 4]) -> FaceContact {
     FaceContact {
         particles,
         beyond: None,
+        limit: None,
         thickness: 0.0,
     }
 }
@@ -409,6 +410,107 @@ fn a_vertex_on_an_edge_presses_on_the_edge() {
     }
 }
 
+/// A vertex below the plane of a triangle is held as far as the limit and not past it, whatever the plane says.
+#[test]
+fn past_its_limit_a_contact_is_open() {
+    // The edge from the first corner to the second is the x axis, the surface ends towards -y.
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    let limit = FaceLimit {
+        normal: [0.0, -1.0, 0.0],
+        distance: 0.25,
+    };
+    for (y, limit, held) in [
+        (-0.2, Some(limit), true),
+        (
+            -0.2,
+            Some(FaceLimit {
+                distance: 0.0,
+                ..limit
+            }),
+            false,
+        ),
+        (-0.3, Some(limit), false),
+        (-0.3, None, true),
+        (
+            0.3,
+            Some(FaceLimit {
+                distance: 0.0,
+                ..limit
+            }),
+            true,
+        ),
+    ] {
+        let at = [dvec3(0.3, y, 0.01), corners[0], corners[1], corners[2]];
+        for iterations in [1, 3] {
+            let mut solver = Solver::<f64>::new(&at);
+            solver.set_mass(0, 1.0);
+            let contact = FaceContact {
+                limit,
+                ..face([0, 1, 2, 3])
+            };
+            set(&mut solver, &SMOOTH, &[], &[contact]);
+            let settings = StepSettings {
+                substeps: 10,
+                iterations,
+                gravity: Some(GRAVITY),
+                ..StepSettings::new(0.016)
+            };
+            for _ in 0..20 {
+                step(&mut solver, &settings);
+            }
+            let z = solver.position(0).z;
+            assert_eq!(z.abs() < 1e-12, held, "{z} at {y} with {limit:?}");
+            let state = solver.contacts().next().unwrap();
+            assert_eq!(state.pressure > 0.0, held);
+            assert!(state.depth <= 1e-12, "past the limit nothing overlaps");
+        }
+    }
+}
+
+/// What a contact pressed along one plane is taken back along that plane, also if another contact has moved the vertex
+/// to where the other plane is the nearer one: the sum of what acted is nothing.
+#[test]
+fn an_impulse_is_taken_back_where_it_acted() {
+    // A front that faces x with a bottom that faces -z, and a plate that drives the vertex down and against the front.
+    let at = [
+        dvec3(-0.01, 0.1, 0.02),
+        DVec3::NEG_Y,
+        DVec3::Y,
+        DVec3::Z,
+        dvec3(-3.0, -3.0, 0.25),
+        dvec3(0.0, 3.0, -0.05),
+        dvec3(3.0, -3.0, -0.35),
+    ];
+    let [a, b, c] = [at[4], at[5], at[6]];
+    assert!((b - a).cross(c - a).z < 0.0);
+    let contacts = [
+        FaceContact {
+            beyond: Some([0.5, -1.0, 0.0]),
+            ..face([0, 1, 2, 3])
+        },
+        face([0, 4, 5, 6]),
+    ];
+    for friction in [0.0, 0.4] {
+        let law = ContactLaw {
+            friction,
+            recovery_time: 0.0,
+        };
+        let mut solver = Solver::<f64>::new(&at);
+        solver.set_mass(0, 1.0);
+        set(&mut solver, &law, &[], &contacts);
+        let settings = StepSettings {
+            iterations: 6,
+            ..StepSettings::new(1e-3)
+        };
+        step(&mut solver, &settings);
+        let states: Vec<_> = solver.contacts().collect();
+        assert_eq!(states[0].pressure, 0.0, "below the block it is free");
+        let first = states[0].force.length();
+        assert!(first < 1e-9 * states[1].pressure, "{first} N are left");
+        assert!(states[1].pressure > 0.0 && solver.position(0).z < 0.0);
+    }
+}
+
 /// Exactly closed contacts and those that open write nothing: every bit is that of a run without contacts. Vertices
 /// are on a corner, an edge and a face of dyadic coordinates, and all move on together.
 fn closed_contacts_are_silent<R: Real>() {
@@ -643,6 +745,17 @@ fn bad_contacts_and_foreign_colors_are_refused() {
                 },
                 "thickness",
             ),
+            (
+                SMOOTH,
+                FaceContact {
+                    limit: Some(FaceLimit {
+                        normal: [0.0, -1.0, 0.0],
+                        distance: bad,
+                    }),
+                    ..good
+                },
+                "limit distance",
+            ),
         ] {
             let set = solver.set_contacts(&law, (&[], &none), (&[contact], &zeros(1)));
             let error = set.unwrap_err().to_string();
@@ -651,15 +764,23 @@ fn bad_contacts_and_foreign_colors_are_refused() {
         }
     }
     for normal in [[0.0; 3], [f64::NAN, 0.0, 1.0]] {
-        let contact = FaceContact {
-            beyond: Some(normal),
-            ..good
+        let limit = FaceLimit {
+            normal,
+            distance: 0.0,
         };
-        assert!(
-            solver
-                .set_contacts(&SMOOTH, (&[], &none), (&[contact], &zeros(1)))
-                .is_err()
-        );
+        for contact in [
+            FaceContact {
+                beyond: Some(normal),
+                ..good
+            },
+            FaceContact {
+                limit: Some(limit),
+                ..good
+            },
+        ] {
+            let set = solver.set_contacts(&SMOOTH, (&[], &none), (&[contact], &zeros(1)));
+            assert!(set.is_err());
+        }
         let contact = pair([0, 1], DVec3::from_array(normal));
         assert!(
             solver
@@ -702,13 +823,17 @@ mod oracle {
         pub(super) weight: f64,
     }
 
-    /// Particles, the coefficients of the normal beyond an edge or the normal of a pair, a thickness.
+    /// Particles, the coefficients of the normal beyond an edge and of a limit with its distance, zeros for none; or the
+    /// normal of a pair. A thickness.
     #[derive(Clone)]
     pub(super) struct Contact {
         pub(super) particles: Vec<usize>,
         pub(super) normal: Option<V>,
+        pub(super) limit: (V, f64),
         pub(super) of_pair: V,
         pub(super) thickness: f64,
+        /// The plane that the multiplier belongs to.
+        pub(super) plane: usize,
         pub(super) multiplier: f64,
         pub(super) friction: V,
     }
@@ -765,32 +890,70 @@ mod oracle {
         planes
     }
 
+    /// Whether a vertex inside is past the end of the surface.
+    fn is_past(contact: &Contact, x: &[V]) -> bool {
+        let (n, distance) = contact.limit;
+        if contact.normal.is_none() || n == [0.0; 3] {
+            return false;
+        }
+        let [e1, e2, r] = [(2, 1), (3, 1), (0, 1)].map(|(a, b)| add(x[a], x[b], -1.0));
+        let n = add(add(cross(e1, e2).map(|a| a * n[2]), e1, n[0]), e2, n[1]);
+        let n = n.map(|c| c / dot(n, n).sqrt());
+        let t = (dot(e1, r) / dot(e1, e1)).clamp(0.0, 1.0);
+        dot(n, add(r, e1, -t)) > distance + contact.thickness
+    }
+
+    fn push(particles: &mut [Particle], contact: &Contact, shares: &[f64], impulse: V) {
+        for (&p, share) in contact.particles.iter().zip(shares) {
+            particles[p].x = add(particles[p].x, impulse, particles[p].weight * share);
+        }
+    }
+
     pub(super) fn solve(
         particles: &mut [Particle],
         contact: &mut Contact,
         friction: f64,
         kept: f64,
     ) {
-        let x: Vec<V> = contact.particles.iter().map(|&p| particles[p].x).collect();
-        let before: Vec<V> = contact
-            .particles
-            .iter()
-            .map(|&p| particles[p].previous)
-            .collect();
-        let mut best: Option<(f64, Vec<f64>, V)> = None;
-        for (shares, n) in planes(contact, &x) {
-            let now = dot(n, combine(&shares, &x)) - contact.thickness;
-            let old = dot(n, combine(&shares, &before)) - contact.thickness;
-            let residual = now - kept * old.min(0.0);
-            // Outside of the triangle's plane is outside.
-            if best
-                .as_ref()
-                .is_none_or(|best| best.0 < 0.0 && residual > best.0)
-            {
-                best = Some((residual, shares, n));
+        let points = |particles: &[Particle]| -> Vec<V> {
+            contact.particles.iter().map(|&p| particles[p].x).collect()
+        };
+        let x = points(particles);
+        let before = contact.particles.iter().map(|&p| particles[p].previous);
+        let before: Vec<V> = before.collect();
+        // The plane, its residual, shares and normal; none where the contact is open.
+        let chosen = |x: &[V]| {
+            let mut best: Option<(f64, usize)> = None;
+            let planes = planes(contact, x);
+            for (plane, (shares, n)) in planes.iter().enumerate() {
+                let now = dot(*n, combine(shares, x)) - contact.thickness;
+                let old = dot(*n, combine(shares, &before)) - contact.thickness;
+                let residual = now - kept * old.min(0.0);
+                // Outside of the triangle's plane is outside.
+                if best.is_none_or(|best| best.0 < 0.0 && residual > best.0) {
+                    best = Some((residual, plane));
+                }
             }
+            let (residual, plane) = best.expect("one plane at least");
+            (residual, plane, residual < 0.0 && is_past(contact, x))
+        };
+        let (mut residual, mut plane, is_past) = chosen(&x);
+        let mut x = x;
+        if contact.multiplier > 0.0 && (is_past || plane != contact.plane) {
+            let (shares, n) = planes(contact, &x).swap_remove(contact.plane);
+            let impulse = add(contact.friction, n, contact.multiplier);
+            push(particles, contact, &shares, impulse.map(|i| -i));
+            x = points(particles);
+            let (now, at, is_past) = chosen(&x);
+            (contact.multiplier, contact.friction) = (0.0, [0.0; 3]);
+            if now >= 0.0 || is_past {
+                return;
+            }
+            (residual, plane) = (now, at);
+        } else if is_past {
+            return;
         }
-        let (residual, shares, n) = best.expect("one plane at least");
+        let (shares, n) = planes(contact, &x).swap_remove(plane);
         let of = |k: usize| particles[contact.particles[k]].weight;
         let w: f64 = shares.iter().enumerate().map(|(k, s)| of(k) * s * s).sum();
         let new = (contact.multiplier - residual / w).max(0.0);
@@ -798,7 +961,7 @@ mod oracle {
             return;
         }
         let mut impulse = n.map(|n| n * (new - contact.multiplier));
-        contact.multiplier = new;
+        (contact.multiplier, contact.plane) = (new, plane);
         let moved: Vec<V> = x
             .iter()
             .zip(&before)
@@ -815,10 +978,7 @@ mod oracle {
             impulse = add(add(impulse, wanted, 1.0), contact.friction, -1.0);
             contact.friction = wanted;
         }
-        for (k, share) in shares.iter().enumerate() {
-            let particle = &mut particles[contact.particles[k]];
-            particle.x = add(particle.x, impulse, particle.weight * share);
-        }
+        push(particles, contact, &shares, impulse);
     }
 }
 
@@ -865,7 +1025,9 @@ proptest! {
                 pairs.push(pair([small[0], small[1]], DVec3::from_array(normal) + DVec3::Z));
             } else if (b - a).cross(c - a).length() > 0.3 {
                 let beyond = (kind > 1).then_some([normal[0], normal[1] - 1.0, 1.0]);
-                faces.push(FaceContact { beyond, thickness, ..face(small) });
+                let normal = [normal[1], normal[2] - 0.7, normal[0]];
+                let limit = (kind > 2).then_some(FaceLimit { normal, distance: thickness });
+                faces.push(FaceContact { beyond, limit, thickness, ..face(small) });
             }
         }
         let law = ContactLaw { friction, recovery_time };
@@ -874,11 +1036,13 @@ proptest! {
         let settings = StepSettings { substeps, iterations, gravity: Some(GRAVITY), ..StepSettings::new(time) };
         step(&mut solver, &settings);
 
-        type Raw = (Vec<u32>, Option<[f64; 3]>, [f64; 3], f64);
-        let of_pairs = pairs.iter().map(|c| (c.particles.to_vec(), None, c.normal.to_array(), 0.0));
+        type Raw = (Vec<u32>, Option<[f64; 3]>, [f64; 3], f64, ([f64; 3], f64));
+        let no_limit = ([0.0; 3], 0.0);
+        let of_pairs = pairs.iter().map(|c| (c.particles.to_vec(), None, c.normal.to_array(), 0.0, no_limit));
         let of_faces = faces.iter().map(|c| {
             let beyond = Some(c.beyond.unwrap_or_default());
-            (c.particles.to_vec(), beyond, [0.0; 3], c.thickness)
+            let limit = c.limit.map_or(no_limit, |limit| (limit.normal, limit.distance));
+            (c.particles.to_vec(), beyond, [0.0; 3], c.thickness, limit)
         });
         let order = |list: Vec<Raw>, colors: &Coloring| {
             let mut order: Vec<usize> = (0..list.len()).collect();
@@ -888,6 +1052,8 @@ proptest! {
                 normal: list[*c].1,
                 of_pair: list[*c].2,
                 thickness: list[*c].3,
+                limit: list[*c].4,
+                plane: 0,
                 multiplier: 0.0,
                 friction: [0.0; 3],
             };
@@ -956,7 +1122,8 @@ proptest! {
             } else {
                 let thickness = if kind == 1 { 10f64.powi(size) } else { 0.0 };
                 let beyond = (kind > 1).then_some(normal);
-                faces.push(FaceContact { particles: numbers, beyond, thickness });
+                let limit = (kind > 2).then_some(FaceLimit { normal, distance: 10f64.powi(size) });
+                faces.push(FaceContact { particles: numbers, beyond, limit, thickness });
             }
         }
         let law = ContactLaw { friction, ..SMOOTH };

@@ -452,6 +452,7 @@ fn a_fixed_triangle_passes_a_contact_on() {
     let contact = FaceContact {
         particles: [0, 1, 2, 3],
         beyond: None,
+        limit: None,
         thickness: 0.0,
     };
     let law = ContactLaw {
