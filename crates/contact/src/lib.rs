@@ -60,6 +60,7 @@ mod face;
 mod index;
 mod normals;
 mod pairs;
+mod parts;
 mod query;
 mod settings;
 mod state;

@@ -19,6 +19,8 @@ pub(crate) struct Shape<'a> {
     /// By slot the unit normal; zero for an empty slot and for a triangle that must not be touched, because it has
     /// collapsed or its tet is inverted.
     pub(crate) normals: &'a [DVec3],
+    /// By slot the area vector, see [`ContactSurface::area`]; of use where there is a triangle.
+    pub(crate) areas: &'a [DVec3],
 }
 
 impl<'a> Shape<'a> {
@@ -111,6 +113,7 @@ mod tests {
             surface: &surface,
             positions,
             normals: &normals,
+            areas: &[],
         };
         let particle = |x: DVec3| ParticleId::new(positions.iter().position(|p| *p == x).unwrap());
         let top = particle(DVec3::ONE);

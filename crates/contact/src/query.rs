@@ -17,7 +17,7 @@
 //! Sources: J. A. Bærentzen and H. Aanæs 2005 (sides); H. Chen, E. Diaz, C. Yuksel 2023 (valid ways). Cost: a search in
 //! the tree, and for each triangle found a few dozen operations.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use incise_cutting::FaceTag;
 use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest_on_triangle};
 
@@ -32,6 +32,8 @@ use crate::walk::{Barycentric, walk};
 
 /// Sides face each other where the dot product of their unit normals is below this.
 const FACING: f64 = 0.2;
+/// The limit for dot products in single precision beyond which it is passed in double precision, too.
+const FACING_SINGLE: f32 = 0.2 + 1e-5;
 /// Distances that differ by this, in mean edges, are the same.
 const SAME: f64 = 1e-9;
 /// Up to this distance in mean edges a vertex counts as touching an edge or a vertex.
@@ -73,6 +75,13 @@ impl Found {
         is_deep: false,
         is_buried: false,
     };
+
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+        self.inside = NONE;
+        self.is_deep = false;
+        self.is_buried = false;
+    }
 
     pub(crate) fn contacts(&self) -> &[FaceContact] {
         &self.contacts[..self.count]
@@ -144,6 +153,7 @@ impl<const N: usize> Nearest<N> {
 /// The outward normals of a vertex, one for each tag around it.
 struct VertexNormals {
     normals: [(FaceTag, DVec3); Self::MOST],
+    single: [Vec3; Self::MOST],
     count: usize,
 }
 
@@ -154,6 +164,7 @@ impl VertexNormals {
     fn new(shape: &Shape<'_>, vertex: ParticleId) -> Self {
         let mut this = Self {
             normals: [(FaceTag::Outer, DVec3::ZERO); Self::MOST],
+            single: [Vec3::ZERO; Self::MOST],
             count: 0,
         };
         for (slot, _) in shape.surface.corners(vertex) {
@@ -164,10 +175,12 @@ impl VertexNormals {
                 this.normals[this.count - 1].0 = tag;
                 this.count - 1
             });
-            this.normals[place].1 += shape.surface.area(slot, shape.positions);
+            this.normals[place].1 += shape.areas[slot as usize];
         }
-        for (_, normal) in &mut this.normals[..this.count] {
+        for k in 0..this.count {
+            let normal = &mut this.normals[k].1;
             *normal = normal.normalize_or_zero();
+            this.single[k] = normal.as_vec3();
         }
         this
     }
@@ -179,6 +192,22 @@ impl VertexNormals {
             .map(|(_, normal)| *normal)
             .sum::<DVec3>()
             .normalize_or_zero()
+    }
+
+    /// Whether a triangle does not face the vertex for sure, whatever rounding does; cheap.
+    #[inline]
+    fn turn_away(&self, normal: Vec3) -> bool {
+        let mut normals = self.single[..self.count].iter();
+        self.count > 0 && normals.all(|n| n.dot(normal) >= FACING_SINGLE)
+    }
+
+    /// Whether no triangle faces the vertex whose normal is in a box.
+    #[inline]
+    fn all_turn_away(&self, normals: &Box32) -> bool {
+        let (low, high) = (Vec3::from(normals.low), Vec3::from(normals.high));
+        let mut own = self.single[..self.count].iter();
+        // The least dot product with a vector of the box.
+        self.count > 0 && own.all(|&n| (n * low).min(n * high).element_sum() >= FACING_SINGLE)
     }
 
     /// The least dot product with a normal: how little a triangle faces the vertex. A vertex without a normal, whose
@@ -229,8 +258,8 @@ impl Query<'_> {
         let vertex = self.vertex_of(id, &normals)?;
         let wanted = Box32::around(&Bounds::around([vertex.behind]));
         let mut containing: Option<TetId> = None;
-        tets.search(&wanted, |tet, _| {
-            let tet = TetId(tet);
+        tets.search(&wanted, |leaf| {
+            let tet = TetId(leaf.number);
             if self.may_touch_part(&vertex, tet) && self.is_inside(tet, &vertex) {
                 containing = Some(containing.map_or(tet, |other| other.min(tet)));
             }
@@ -252,12 +281,12 @@ impl Query<'_> {
         })
     }
 
-    /// What `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
-    pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>) -> Found {
-        let mut found = Found::NOTHING;
+    /// Writes what `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
+    pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>, found: &mut Found) {
+        found.clear();
         let normals = VertexNormals::new(&self.shape, id);
         let Some(vertex) = self.vertex_of(id, &normals) else {
-            return found;
+            return;
         };
         let x = vertex.x;
         let mut outside = Nearest::<OUTSIDE>::EMPTY;
@@ -266,15 +295,25 @@ impl Query<'_> {
         let around = Bounds::around([x]).widened(self.reach);
         let wanted = Box32::around(&around);
         for tree in self.trees {
-            tree.search(&wanted, |slot, bounds| {
-                if !self.shape.is_sound(slot) || !self.may_touch(&vertex, slot) {
+            // What is unsound has an empty box.
+            let is_wanted = |bounds: &Box32, around: &Box32| {
+                !normals.all_turn_away(around) || bounds.contains(vertex.behind)
+            };
+            tree.search_where(&wanted, is_wanted, |leaf| {
+                let slot = leaf.number;
+                let contains = leaf.bounds.contains(vertex.behind);
+                let turns_away = normals.turn_away(leaf.normal);
+                if (turns_away && !contains) || !self.may_touch(&vertex, slot) {
                     return;
                 }
-                if bounds.contains(vertex.behind) {
+                if contains {
                     let tet = self.shape.triangle(slot).tet;
                     if self.is_inside(tet, &vertex) {
                         containing = containing.min(tet.0);
                     }
+                }
+                if turns_away {
+                    return;
                 }
                 if let Some(near) = self.near(&vertex, slot) {
                     if near.is_inside {
@@ -294,7 +333,7 @@ impl Query<'_> {
         if let Some((near, tet)) = shallow {
             found.push(self.contact(&vertex, near));
             found.inside = tet.0;
-            return found;
+            return;
         }
         if let Some(tet) = was_inside.and_then(|tet| self.followed(tet, &vertex)) {
             containing = tet.0;
@@ -307,7 +346,6 @@ impl Query<'_> {
                 None => found.is_buried = true,
             }
         }
-        found
     }
 
     /// Whether the vertex may touch a triangle: it is no corner of it and their bodies may touch.

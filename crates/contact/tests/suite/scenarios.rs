@@ -6,7 +6,7 @@ use incise_mesh::{ParticleId, TetMesh, kuhn_box};
 use incise_meshing::{Shape, generate};
 
 use crate::oracle::compare;
-use crate::scene::{FRAME, Scene, jittered_box};
+use crate::scene::{FRAME, Scene, direction, jittered_box, noise};
 
 fn moved(mut mesh: TetMesh, by: DVec3) -> TetMesh {
     for x in &mut mesh.positions {
@@ -424,7 +424,11 @@ fn contacts_turn_with_their_bodies() {
     }
     let with = |has: &dyn Fn(&FaceContact) -> bool| contacts.iter().filter(|c| has(c)).count();
     let counts = [with(&|c| c.beyond.is_some()), with(&|c| c.limit.is_some())];
-    assert!(counts.iter().all(|count| *count > 3), "{counts:?} of {}", contacts.len());
+    assert!(
+        counts.iter().all(|count| *count > 3),
+        "{counts:?} of {}",
+        contacts.len()
+    );
 }
 
 fn same(one: &ContactDetector, other: &ContactDetector) -> bool {
@@ -549,6 +553,129 @@ fn when_a_search_is_due() {
             intervals
         );
     }
+}
+
+/// Motion asks for a search only where it may bring surfaces together.
+#[test]
+fn what_asks_for_no_search() {
+    let cube = |at: DVec3| moved(kuhn_box([3; 3], DVec3::ONE), at);
+    let bodies = [
+        cube(DVec3::ZERO),
+        cube(DVec3::new(0.0, 0.0, 1.02)),
+        cube(DVec3::new(50.0, 0.0, 0.0)),
+    ];
+    let settings = ContactSettings {
+        self_contact: false,
+        ..ContactSettings::default()
+    };
+    let mut scene = Scene::new(&bodies, settings);
+    assert!(scene.update().searched);
+    // A body far away flies off.
+    for _ in 0..5 {
+        scene.shift(2, DVec3::new(0.0, 3.0, 0.0));
+        for p in scene.particles_of(2) {
+            scene.velocities[p] = DVec3::new(0.0, 180.0, 0.0);
+        }
+        assert!(!scene.update().searched, "far away");
+    }
+    assert_eq!(scene.contacts.faces().len(), 32);
+    // When it comes near, it matters.
+    let back = scene.positions[128] - DVec3::new(0.0, 0.0, 2.05);
+    scene.velocities.fill(DVec3::ZERO);
+    scene.shift(2, -back);
+    assert!(scene.update().searched);
+    assert!(scene.contacts.faces().len() > 40, "it lies on the others");
+    // What approaches by more than the search looks ahead at all asks for parts of a frame, not for a search in each.
+    for p in scene.particles_of(1) {
+        scene.velocities[p].x = 100.0;
+    }
+    assert!(scene.update().searched, "it reaches further now");
+    for _ in 0..3 {
+        assert!(!scene.update().searched, "nothing has moved");
+    }
+}
+
+/// A vertex that slides by half a barycentric coordinate on a sliver has hardly moved: no search.
+#[test]
+fn slivers_ask_for_no_search() {
+    let mut below = kuhn_box([4, 4, 1], DVec3::new(1.0, 1.0, 0.25));
+    // A row of slivers on the top.
+    for x in &mut below.positions {
+        if (x.y - 0.5).abs() < 1e-9 {
+            x.y = 0.2505;
+        }
+    }
+    let above = moved(
+        kuhn_box([1; 3], DVec3::splat(0.2)),
+        DVec3::new(0.3, 0.2502, 0.2501),
+    );
+    let mut scene = Scene::new(&[below, above], ContactSettings::default());
+    assert!(scene.update().searched);
+    assert!(scene.contacts.faces().len() >= 4);
+    for _ in 0..4 {
+        scene.shift(1, DVec3::new(0.0, 1e-3, 0.0));
+        assert!(!scene.update().searched);
+    }
+    scene.shift(1, DVec3::new(0.0, 0.1, 0.0));
+    assert!(scene.update().searched);
+}
+
+/// Between two searches no contact is missed: what a search would find that may touch within the frame, is known.
+#[test]
+fn kept_lists_are_complete() {
+    let (mut kept, mut compared) = (0, 0);
+    for seed in 0..6 {
+        let ball = generate(Shape::Sphere, 300).unwrap();
+        let top = ball.positions.iter().fold(0.0_f64, |top, x| top.max(x.z));
+        let at = [
+            DVec3::ZERO,
+            DVec3::new(0.2, 0.1, 2.02),
+            DVec3::new(2.05, 0.3, 0.9),
+            DVec3::new(0.4, -2.1, 0.5),
+        ];
+        let bodies: Vec<_> = at.map(|at| moved(ball.clone(), at * top)).to_vec();
+        let count = ball.positions.len();
+        let mut scene = Scene::new(&bodies, ContactSettings::default());
+        for _ in 0..40 {
+            for (i, x) in scene.positions.iter_mut().enumerate() {
+                let (body, center) = (i / count, at[i / count] * top);
+                let spin = direction(seed, body) * 0.4 * noise(seed, body + 9);
+                let drift = direction(seed ^ 3, body) * 0.3 * top;
+                scene.velocities[i] = drift + spin.cross(*x - center);
+                *x += scene.velocities[i] * FRAME;
+            }
+            if scene.update().searched {
+                continue;
+            }
+            kept += 1;
+            let mut fresh = scene.contacts.clone();
+            fresh.search_again();
+            fresh.update(&incise_contact::ContactState {
+                mesh: &scene.body,
+                pieces: &scene.pieces,
+                positions: &scene.positions,
+                velocities: &scene.velocities,
+                frame_time: FRAME,
+            });
+            let skin = fresh.settings().skin * fresh.mean_edge();
+            let margin = fresh.reach() - skin;
+            for contact in fresh.faces() {
+                let [vertex, corner, ..] = contact.particles;
+                let gap = contact.gap(&scene.positions);
+                if gap < -0.02 * fresh.mean_edge() || gap > margin + 0.5 * skin {
+                    continue;
+                }
+                compared += 1;
+                let same = |known: &&FaceContact| {
+                    let [v, c, ..] = known.particles;
+                    v == vertex && c as usize / count == corner as usize / count
+                };
+                let known = scene.contacts.faces().iter().find(same);
+                assert!(known.is_some(), "{contact:?} at {gap} is not known");
+            }
+        }
+    }
+    assert!(kept > 100 && compared > 100, "{kept} and {compared}");
 }
 
 /// What degenerates is not touched and does no harm.
