@@ -24,6 +24,7 @@ use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
 use crate::ContactError;
+use crate::edges::{EdgeContact, FeatureEdges, turn};
 use crate::face::FaceContact;
 use crate::index::{NONE, index};
 use crate::normals::Shape;
@@ -58,6 +59,8 @@ pub struct ContactUpdate {
     pub pairs_changed: bool,
     /// Whether [`ContactDetector::faces`] has other particles than before.
     pub faces_changed: bool,
+    /// Whether [`ContactDetector::edges`] has other particles than before; normals change all the time.
+    pub edges_changed: bool,
 }
 
 /// A candidate beside its record: where it was found.
@@ -125,6 +128,10 @@ pub struct ContactDetector {
     pairs: Vec<PairContact>,
     faces: Vec<FaceContact>,
     sightings: Vec<Sighting>,
+    features: FeatureEdges,
+    /// Whether the surface has changed since they were listed.
+    features_are_due: bool,
+    edges: Vec<EdgeContact>,
     /// The vertices inside another part, ascending, each with the tet that contains it.
     inside: Vec<(ParticleId, TetId)>,
     deep: usize,
@@ -154,6 +161,7 @@ struct Room {
     areas: Vec<DVec3>,
     found: Vec<Found>,
     last_faces: Vec<FaceContact>,
+    last_edges: Vec<EdgeContact>,
     last_pairs: Vec<PairContact>,
     last_inside: Vec<(ParticleId, TetId)>,
     /// By piece.
@@ -188,6 +196,9 @@ impl ContactDetector {
             pairs: Vec::new(),
             faces: Vec::new(),
             sightings: Vec::new(),
+            features: FeatureEdges::default(),
+            features_are_due: true,
+            edges: Vec::new(),
             inside: Vec::new(),
             deep: 0,
             buried: 0,
@@ -232,6 +243,9 @@ impl ContactDetector {
         self.inside.clear();
         self.faces.clear();
         self.sightings.clear();
+        self.features.clear();
+        self.features_are_due = true;
+        self.edges.clear();
         self.pairs.clear();
     }
 
@@ -281,6 +295,7 @@ impl ContactDetector {
             *tet = delta.slot_after(*tet);
         }
         self.fresh_is_due = true;
+        self.features_are_due = true;
         self.search_is_due = true;
     }
 
@@ -304,6 +319,7 @@ impl ContactDetector {
             particle.index() < delta.particles_before && tet.index() < delta.tets_before
         });
         self.fresh_is_due = true;
+        self.features_are_due = true;
         self.search_is_due = true;
     }
 
@@ -351,7 +367,15 @@ impl ContactDetector {
         if searched {
             self.reach = reach;
             self.search(state);
-            update.faces_changed = differ(&self.faces, &self.room.last_faces, |c| c.particles);
+            let Room {
+                last_faces,
+                last_edges,
+                ..
+            } = &self.room;
+            update.faces_changed = differ(&self.faces, last_faces, |c| c.particles);
+            update.edges_changed = differ(&self.edges, last_edges, |c| c.particles);
+        } else {
+            turn(&mut self.edges, state.positions);
         }
         update.pairs_changed = differ(&self.pairs, &self.room.last_pairs, |c| c.particles);
         update
@@ -490,6 +514,11 @@ impl ContactDetector {
     fn search(&mut self, state: &ContactState<'_>) {
         self.prepare_slots(state);
         self.sync_trees(state);
+        if self.features_are_due {
+            let rest = &state.mesh.mesh().positions;
+            self.features.list(&self.surface, rest);
+            self.features_are_due = false;
+        }
         self.query(state);
         self.collect(state);
         self.search_is_due = false;
@@ -529,6 +558,7 @@ impl ContactDetector {
             self.fresh_pairs.renumber(&self.surface, &numbers);
             self.mean_edge = self.surface.mean_edge(&state.mesh.mesh().positions);
             self.prepare_slots(state);
+            self.features_are_due = true;
             self.main_slots = self.surface.slot_count();
             let Room { boxes, normals, .. } = &self.room;
             self.main.build(0..index(self.main_slots), boxes, normals);
@@ -548,13 +578,14 @@ impl ContactDetector {
         }
     }
 
-    /// Searches for each vertex.
+    /// Searches for each vertex and each feature edge.
     fn query(&mut self, state: &ContactState<'_>) {
         let Room {
             normals,
             areas,
             found,
             parts,
+            last_edges,
             ..
         } = &mut self.room;
         let (normals, areas) = (&*normals, &*areas);
@@ -605,6 +636,8 @@ impl ContactDetector {
             let vertices = self.vertices.par_iter().zip(&self.parts).zip(found);
             vertices.with_min_len(PARALLEL / 4).for_each(ask);
         }
+        std::mem::swap(&mut self.edges, last_edges);
+        self.features.search(&query, &mut self.edges);
     }
 
     /// Makes lists of what was found for the vertices.
@@ -650,6 +683,19 @@ impl ContactDetector {
     #[must_use]
     pub fn faces(&self) -> &[FaceContact] {
         &self.faces
+    }
+
+    /// The candidates of feature edges, ascending by the ends of the first edge, then the second. Each two edges are there
+    /// once.
+    #[must_use]
+    pub fn edges(&self) -> &[EdgeContact] {
+        &self.edges
+    }
+
+    /// How many edges are sharp enough to be looked at, as of the last search.
+    #[must_use]
+    pub fn feature_edges(&self) -> usize {
+        self.features.count()
     }
 
     /// How many vertices lie inside another body or piece, beyond half of its thickness or without a triangle near
@@ -714,6 +760,14 @@ impl ContactDetector {
             if a != b || a != c {
                 let what = format!("{triangle:?} belongs to several bodies");
                 return Err(ContactError::Differs(what));
+            }
+        }
+        if !self.features_are_due {
+            let mut features = FeatureEdges::default();
+            features.list(&self.surface, &mesh.mesh().positions);
+            if !features.same(&self.features) {
+                let what = "the feature edges are others";
+                return Err(ContactError::Differs(what.to_owned()));
             }
         }
         let built = self.main_slots + self.fresh.len();

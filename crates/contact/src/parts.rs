@@ -3,7 +3,7 @@
 //! The displacements of the vertices of a part, and their velocities, are a rigid motion and a rest:
 //! `d(x) = d₀ + ω × (x − c) + r`, with `d₀` and `ω` by least squares and a box around all `r`. The motion as a whole brings
 //! no two of its points closer to each other, so a part comes closer to itself by the size of that box at most; two
-//! parts come closer to each other by what their fields differ where their boxes meet. A bound by the displacements alone
+//! parts come closer to each other by what their fields differ where their boxes meet, or anywhere if that is less. A bound by the displacements alone
 //! would ask for a search in each frame in which something turns.
 //!
 //! Cost: two passes over the vertices, and a few dozen operations for two parts that are near each other.
@@ -22,6 +22,8 @@ struct Field {
     spin: DVec3,
     /// Around what the rigid motion leaves.
     rest: Bounds,
+    /// Around all of it.
+    whole: Bounds,
 }
 
 impl Field {
@@ -29,6 +31,7 @@ impl Field {
         at: DVec3::ZERO,
         spin: DVec3::ZERO,
         rest: Bounds::EMPTY,
+        whole: Bounds::EMPTY,
     };
 
     /// The rigid motion at a place relative to the center.
@@ -119,6 +122,7 @@ impl Part {
         for (field, by) in self.fields.iter_mut().zip(moves) {
             let rest = by - field.rigid(from);
             field.rest = field.rest.union(Bounds::around([rest]));
+            field.whole = field.whole.union(Bounds::around([by]));
         }
     }
 
@@ -142,12 +146,17 @@ impl Part {
         [0, 1].map(|k| {
             let (one, two) = (&self.fields[k], &other.fields[k]);
             let between = one.rigid(middle - self.center) - two.rigid(middle - other.center);
-            let most = (between + one.rest.high - two.rest.low)
-                .abs()
-                .max((between + one.rest.low - two.rest.high).abs());
-            most.length() + (one.spin - two.spin).length() * half + two.spin.length() * reach
+            let rest = furthest(&one.rest, &two.rest, between);
+            let turned = (one.spin - two.spin).length() * half + two.spin.length() * reach;
+            (rest + turned).min(furthest(&one.whole, &two.whole, DVec3::ZERO))
         })
     }
+}
+
+/// The largest distance of a point of one box from a point of the other, when the first is moved by some way.
+fn furthest(one: &Bounds, other: &Bounds, by: DVec3) -> f64 {
+    let (high, low) = (by + one.high - other.low, by + one.low - other.high);
+    high.abs().max(low.abs()).length()
 }
 
 #[cfg(test)]

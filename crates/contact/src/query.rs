@@ -364,6 +364,18 @@ impl Query<'_> {
         }
     }
 
+    /// Whether the parts of two tets may touch.
+    pub(crate) fn may_touch_each_other(&self, tets: [TetId; 2]) -> bool {
+        let corners = |tet: TetId| self.state.mesh.mesh().tets[tet.index()];
+        let [one, other] = tets.map(|tet| self.body_of[corners(tet)[0].index()]);
+        if one == other {
+            let [one, other] = tets.map(|tet| self.state.pieces.piece_of(tet));
+            self.settings.self_contact || one != other
+        } else {
+            self.settings.bodies.allow(one, other)
+        }
+    }
+
     /// The triangle of a slot if the vertex may be about to touch it or has passed it.
     fn near(&self, vertex: &Vertex<'_>, slot: u32) -> Option<Near> {
         let face = self.shape.normal(slot);
@@ -462,7 +474,7 @@ impl Query<'_> {
         starts.filter_map(move |(slot, _)| self.walk(self.shape.triangle(slot).tet, segment))
     }
 
-    fn walk(&self, tet: TetId, segment: [DVec3; 2]) -> Option<TetId> {
+    pub(crate) fn walk(&self, tet: TetId, segment: [DVec3; 2]) -> Option<TetId> {
         walk(self.state.mesh, self.state.positions, tet, segment)
     }
 

@@ -1,4 +1,4 @@
-// Contacts: pairs of particles across a fresh cut, and vertices against triangles. A thread solves a contact; those of a
+// Contacts: pairs of particles across a fresh cut, vertices against triangles, and edges against edges. A thread solves a contact; those of a
 // dispatch, or of a step of a tail, share no particle. Twin: `contacts.rs` of incise-xpbd, which explains the equations;
 // the order of operations is equal.
 
@@ -7,6 +7,8 @@ override KEEPS: bool = false;
 
 // In place of a particle that a contact does not have.
 const NONE: u32 = 0xffffffffu;
+// The sine of the angle between two edges up to which they count as parallel, squared.
+const PARALLEL_SQUARED: f32 = 0.0001;
 
 struct ContactUniform {
     friction: f32,
@@ -21,11 +23,11 @@ struct ContactUniform {
 @group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
-// Contact -> the vertex and the corners of its triangle, or both particles of a pair and twice NONE; NONE first in an
-// empty place.
+// Contact -> the vertex and the corners of its triangle, the ends of two edges, or both particles of a pair and twice NONE;
+// NONE first in an empty place.
 @group(0) @binding(4) var<storage, read> corners: array<vec4<u32>>;
 // Contact -> two vectors: the second plane in the basis of the triangle and the thickness, or the normal of a pair; the
-// limit in that basis and its distance.
+// limit in that basis and its distance. Of two edges the normal and the thickness, and a distance below 0.
 @group(0) @binding(5) var<storage, read> numbers: array<vec4<f32>>;
 @group(0) @binding(6) var<uniform> law: ContactUniform;
 // Contact -> the sums of a frame of the impulse and of its normal part.
@@ -56,7 +58,8 @@ struct Gap {
 struct Contact {
     now: array<vec4<f32>, 4>,
     old: array<vec3<f32>, 4>,
-    is_face: bool,
+    // False for a pair.
+    has_four: bool,
     beyond: vec4<f32>,
     limit: vec4<f32>,
 }
@@ -200,13 +203,54 @@ fn face_gap(contact: Contact) -> Gap {
     return gap;
 }
 
+// The gap between two edges through their closest points.
+fn edge_gap(contact: Contact) -> Gap {
+    let none = Gap(no_plane(), 0.0, false);
+    let along = direction(contact.now[1].xyz - contact.now[0].xyz);
+    let other = direction(contact.now[3].xyz - contact.now[2].xyz);
+    if !(along.w > 0.0 && other.w > 0.0) {
+        return none;
+    }
+    let across = cross(along.xyz, other.xyz);
+    let square = dot(across, across);
+    if !(square > PARALLEL_SQUARED) {
+        return none;
+    }
+    let r = contact.now[0].xyz - contact.now[2].xyz;
+    var first = -(dot(r, cross(other.xyz, across)) / square) / along.w;
+    var second = -(dot(r, cross(along.xyz, across)) / square) / other.w;
+    if !(is_finite(first) && is_finite(second)) {
+        return none;
+    }
+    let one = settings.one;
+    let is_past = !(first >= 0.0 && first <= one && second >= 0.0 && second <= one);
+    first = max(first, 0.0);
+    first = min(first, one);
+    second = max(second, 0.0);
+    second = min(second, one);
+    let shares = vec4(one - first, first, second - one, -second);
+    let plane = Plane(contact.beyond.xyz, shares, false, true);
+    let now = (contact.now[0].xyz - contact.now[2].xyz)
+        + (contact.now[1].xyz - contact.now[0].xyz) * shares.y
+        + (contact.now[3].xyz - contact.now[2].xyz) * shares.w;
+    let old = (contact.old[0] - contact.old[2])
+        + (contact.old[1] - contact.old[0]) * shares.y
+        + (contact.old[3] - contact.old[2]) * shares.w;
+    let value = dot(plane.normal, now) - contact.beyond.w;
+    let before = dot(plane.normal, old) - contact.beyond.w;
+    return Gap(plane, new_part(value, before), is_past);
+}
+
 fn pair_plane(contact: Contact) -> Plane {
     let shares = vec4(-settings.one, settings.one, 0.0, 0.0);
     return Plane(contact.beyond.xyz, shares, false, true);
 }
 
 fn gap_of(contact: Contact) -> Gap {
-    if contact.is_face {
+    if contact.has_four {
+        if contact.limit.w < 0.0 {
+            return edge_gap(contact);
+        }
         return face_gap(contact);
     }
     let plane = pair_plane(contact);
@@ -217,8 +261,11 @@ fn gap_of(contact: Contact) -> Gap {
 
 // The first or the second plane.
 fn plane_of(contact: Contact, is_second: bool) -> Plane {
-    if !contact.is_face {
+    if !contact.has_four {
         return pair_plane(contact);
+    }
+    if contact.limit.w < 0.0 {
+        return edge_gap(contact).plane;
     }
     let now = basis_now(contact);
     if is_second {
@@ -245,7 +292,7 @@ fn pushed(contact: Contact, shares: vec4<f32>, impulse: vec3<f32>) -> Contact {
 fn store_contact(corner: vec4<u32>, contact: Contact) {
     particles[corner.x] = contact.now[0];
     particles[corner.y] = contact.now[1];
-    if contact.is_face {
+    if contact.has_four {
         particles[corner.z] = contact.now[2];
         particles[corner.w] = contact.now[3];
     }
@@ -256,15 +303,15 @@ fn solve_contact(index: u32) {
     if corner.x == NONE {
         return;
     }
-    let is_face = corner.z != NONE;
+    let has_four = corner.z != NONE;
     var contact: Contact;
-    contact.is_face = is_face;
+    contact.has_four = has_four;
     contact.now[0] = particles[corner.x];
     contact.now[1] = particles[corner.y];
     contact.old[0] = previous[corner.x].xyz;
     contact.old[1] = previous[corner.y].xyz;
     contact.beyond = numbers[2u * index];
-    if is_face {
+    if has_four {
         contact.now[2] = particles[corner.z];
         contact.now[3] = particles[corner.w];
         contact.old[2] = previous[corner.z].xyz;
@@ -326,7 +373,7 @@ fn solve_contact(index: u32) {
     if law.friction > 0.0 {
         var slide = (contact.now[0].xyz - contact.old[0]) * shares.x
             + (contact.now[1].xyz - contact.old[1]) * shares.y;
-        if is_face {
+        if has_four {
             slide = slide + (contact.now[2].xyz - contact.old[2]) * shares.z
                 + (contact.now[3].xyz - contact.old[3]) * shares.w;
         }

@@ -1,8 +1,8 @@
 //! [`Contacts`]: what of an island touches, found between its substeps and handed to its solver.
 //!
 //! A detector (`incise-contact`) follows the cuts of the island's mesh and lists what may touch in the frame to come:
-//! pairs of particles across fresh cuts, and vertices near triangles. The lists are colored when their particles
-//! change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
+//! pairs of particles across fresh cuts, vertices near triangles, and sharp edges near each other. The lists are colored
+//! when their particles change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
 //! surfaces approach each other by more than the search looks ahead, the frame is divided and contacts are found again.
 //! What pressed is summed up by pairs of pieces after the frame, for forces and for the events of contacts that begin
 //! and end.
@@ -20,7 +20,7 @@ use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
 use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
 use incise_graph::{Coloring, Incidence};
 use incise_mesh::{ParticleId, closest_on_triangle};
-use incise_xpbd::{ContactLaw, FaceContact, FaceLimit, PairContact};
+use incise_xpbd::{ContactLaw, EdgeContact, FaceContact, FaceLimit, PairContact, SurfaceContact};
 
 use crate::backend::{AnySolver, each, each_mut};
 use crate::report::{ContactCounts, milliseconds};
@@ -40,14 +40,6 @@ const DEEP: f64 = 0.1;
 /// For how long it has to: s, and recovery times, within which an overlap of the start has parted.
 const DEEP_TIME: f64 = 0.25;
 const RECOVERIES: f64 = 5.0;
-/// A place in the list of contacts.
-const NO_CONTACT: FaceContact = FaceContact {
-    particles: [0; 4],
-    beyond: None,
-    limit: None,
-    thickness: 0.0,
-};
-
 /// The pairs of bodies that contact joins into islands, if all that the scene says about it is in its range.
 pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
     let Some(contact) = &scene.contact else {
@@ -143,9 +135,9 @@ pub(crate) struct Contacts {
     law: ContactLaw,
     thickness: f64,
     pair_colors: Coloring,
-    face_colors: Coloring,
-    /// The contacts of vertices as the solver takes them, from the last search.
-    faces: Vec<FaceContact>,
+    surface_colors: Coloring,
+    /// The contacts of vertices and those of edges as the solver takes them, from the last search.
+    surfaces: Vec<SurfaceContact>,
     /// Ascending by pieces.
     touches: Vec<Touch>,
     /// For how long in s a contact has been deep at the end of each frame.
@@ -218,8 +210,8 @@ impl Contacts {
             law: law(spec),
             thickness: spec.thickness,
             pair_colors: Coloring::default(),
-            face_colors: Coloring::default(),
-            faces: Vec::new(),
+            surface_colors: Coloring::default(),
+            surfaces: Vec::new(),
             touches: Vec::new(),
             deep_time: 0.0,
             before: Vec::new(),
@@ -316,44 +308,28 @@ impl Contacts {
             frame_time: time,
         });
         let particles = self.room.positions.len();
-        let (pairs, faces) = (self.detector.pairs(), self.detector.faces());
+        let pairs = self.detector.pairs();
         if update.pairs_changed || pairs.len() != self.pair_colors.vertex_count() {
             let all = pairs.iter().map(|contact| contact.particles);
             self.pair_colors = colors(particles, all)?;
         }
-        if update.searched || faces.len() != self.faces.len() {
-            let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
-            let thickness = |particles: [u32; 4]| {
-                let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
-                if self.thickness > 0.0 && vertex == corner {
-                    let [x, a, b, c] = particles.map(|p| rest[p as usize]);
-                    self.thickness
-                        .min(x.distance(closest_on_triangle([a, b, c], x).point))
-                } else {
-                    self.thickness
-                }
-            };
-            let mut changed = faces.len() != self.face_colors.vertex_count();
-            self.faces.resize(faces.len(), NO_CONTACT);
-            for (contact, out) in faces.iter().zip(&mut self.faces) {
-                changed |= contact.particles != out.particles;
-                let limit = contact.limit.map(|limit| FaceLimit {
-                    normal: limit.normal,
-                    distance: limit.distance,
-                });
-                *out = FaceContact {
-                    particles: contact.particles,
-                    beyond: contact.beyond,
-                    limit,
-                    thickness: thickness(contact.particles),
-                };
+        let (faces, edges) = (self.detector.faces().len(), self.detector.edges().len());
+        if update.searched || faces + edges != self.surfaces.len() {
+            self.list_surfaces(&mesh.mesh().positions);
+            let lists = update.faces_changed || update.edges_changed;
+            if lists || self.surfaces.len() != self.surface_colors.vertex_count() {
+                let all = self.surfaces.iter().map(SurfaceContact::particles);
+                self.surface_colors = colors(particles, all)?;
             }
-            if changed {
-                let all = self.faces.iter().map(|contact| contact.particles);
-                self.face_colors = colors(particles, all)?;
+        } else {
+            let edges = self.detector.edges().iter();
+            for (contact, known) in edges.zip(&mut self.surfaces[faces..]) {
+                if let SurfaceContact::Edges(known) = known {
+                    known.normal = contact.normal;
+                }
             }
         }
-        let room = &mut self.room;
+        let (room, pairs) = (&mut self.room, self.detector.pairs());
         room.pairs.clear();
         room.pairs.extend(pairs.iter().map(|contact| PairContact {
             particles: contact.particles,
@@ -361,12 +337,52 @@ impl Contacts {
         }));
         each_mut!(solver, solver => {
             let pairs = (&room.pairs[..], &self.pair_colors);
-            let faces = (&self.faces[..], &self.face_colors);
-            let set = solver.set_contacts(&self.law, pairs, faces);
+            let surfaces = (&self.surfaces[..], &self.surface_colors);
+            let set = solver.set_contacts(&self.law, pairs, surfaces);
             set.map_err(|source| Error::Xpbd { field: "contact".into(), source })?;
         });
         self.milliseconds += milliseconds(start.elapsed());
         Ok(())
+    }
+
+    /// Takes over the contacts between surfaces from the detector. Between surfaces of one body, a thickness is at most
+    /// their distance at rest.
+    fn list_surfaces(&mut self, rest: &[DVec3]) {
+        let bodies = self.detector.body_of();
+        let thickness = |[one, other]: [u32; 2], distance: &dyn Fn() -> f64| {
+            if self.thickness > 0.0 && bodies[one as usize] == bodies[other as usize] {
+                self.thickness.min(distance())
+            } else {
+                self.thickness
+            }
+        };
+        self.surfaces.clear();
+        self.surfaces
+            .extend(self.detector.faces().iter().map(|contact| {
+                let [vertex, corner, ..] = contact.particles;
+                let distance = || {
+                    let [x, a, b, c] = contact.particles.map(|p| rest[p as usize]);
+                    x.distance(closest_on_triangle([a, b, c], x).point)
+                };
+                SurfaceContact::Face(FaceContact {
+                    particles: contact.particles,
+                    beyond: contact.beyond,
+                    limit: contact.limit.map(|limit| FaceLimit {
+                        normal: limit.normal,
+                        distance: limit.distance,
+                    }),
+                    thickness: thickness([vertex, corner], &distance),
+                })
+            }));
+        self.surfaces
+            .extend(self.detector.edges().iter().map(|contact| {
+                let [end, _, other, _] = contact.particles;
+                SurfaceContact::Edges(EdgeContact {
+                    particles: contact.particles,
+                    normal: contact.normal,
+                    thickness: thickness([end, other], &|| contact.distance(rest)),
+                })
+            }));
     }
 
     /// Notes what pressed in the part of the frame that has ended.
@@ -401,8 +417,7 @@ impl Contacts {
                     continue;
                 }
                 let force = if vertex > against { contact.force } else { -contact.force };
-                let point = solver.position(contact.vertex as usize);
-                out.push(Touch { pieces: key, force, torque: point.cross(force) });
+                out.push(Touch { pieces: key, force, torque: contact.point.cross(force) });
             }
         });
     }
@@ -472,8 +487,8 @@ impl Contacts {
         self.room.touches.clear();
         self.deep_time = 0.0;
         self.end_frame();
-        (self.pair_colors, self.face_colors) = (Coloring::default(), Coloring::default());
-        self.faces.clear();
+        (self.pair_colors, self.surface_colors) = (Coloring::default(), Coloring::default());
+        self.surfaces.clear();
         let none = Coloring::default();
         each_mut!(solver, solver => {
             let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
@@ -523,8 +538,9 @@ impl Contacts {
         let triangles = self.detector.surface().triangle_count();
         particles * PARTICLE
             + triangles * TRIANGLE
-            + size_of_val(&*self.faces)
+            + size_of_val(&*self.surfaces)
             + size_of_val(self.detector.faces())
+            + size_of_val(self.detector.edges())
             + size_of_val(self.detector.pairs())
     }
 

@@ -38,8 +38,29 @@ struct Slow<'a> {
     partners: BTreeMap<u32, BTreeSet<u32>>,
 }
 
+/// All candidates of edges at the present positions: each feature edge against each other one.
+pub(crate) fn expected_edges(scene: &Scene) -> BTreeSet<[u32; 4]> {
+    slow(scene).edges()
+}
+
 /// All candidates at the present positions.
 pub(crate) fn expected(scene: &Scene) -> Expected {
+    let slow = slow(scene);
+    let all: Vec<BoundaryTriangle> = scene.body.boundary().collect();
+    let mut vertices: BTreeMap<u32, Vec<BoundaryTriangle>> = BTreeMap::new();
+    for triangle in &all {
+        for p in triangle.particles {
+            vertices.entry(p.0).or_default().push(*triangle);
+        }
+    }
+    let mut expected = Expected::default();
+    for (vertex, fan) in vertices {
+        slow.vertex(vertex, &fan, &mut expected);
+    }
+    expected
+}
+
+fn slow(scene: &Scene) -> Slow<'_> {
     let state = ContactState {
         mesh: &scene.body,
         pieces: &scene.pieces,
@@ -72,18 +93,7 @@ pub(crate) fn expected(scene: &Scene) -> Expected {
             slow.fans[p.index()].push(i);
         }
     }
-    let all: Vec<BoundaryTriangle> = scene.body.boundary().collect();
-    let mut vertices: BTreeMap<u32, Vec<BoundaryTriangle>> = BTreeMap::new();
-    for triangle in &all {
-        for p in triangle.particles {
-            vertices.entry(p.0).or_default().push(*triangle);
-        }
-    }
-    let mut expected = Expected::default();
-    for (vertex, fan) in vertices {
-        slow.vertex(vertex, &fan, &mut expected);
-    }
-    expected
+    slow
 }
 
 impl Slow<'_> {
@@ -310,6 +320,121 @@ impl Slow<'_> {
         if others.any(contains) {
             expected.deep.insert(vertex);
         }
+    }
+
+    fn edges(&self) -> BTreeSet<[u32; 4]> {
+        let positions = &self.state.positions;
+        // Both triangles of each edge, first the one in which it runs upward.
+        let mut around: BTreeMap<[u32; 2], [Option<BoundaryTriangle>; 2]> = BTreeMap::new();
+        for triangle in self.scene.body.boundary() {
+            let p = triangle.particles.map(|p| p.0);
+            for k in 0..3 {
+                let [from, to] = [p[k], p[(k + 1) % 3]];
+                let side = usize::from(from > to);
+                around.entry([from.min(to), from.max(to)]).or_default()[side] = Some(triangle);
+            }
+        }
+        let rest = &self.scene.body.mesh().positions;
+        let normal_of = |triangle: &BoundaryTriangle, at: &[DVec3]| {
+            let [a, b, c] = triangle.particles.map(|p| at[p.index()]);
+            (b - a).cross(c - a).normalize()
+        };
+        let mut features = Vec::new();
+        for (ends, triangles) in around {
+            let [Some(one), Some(two)] = triangles else {
+                continue;
+            };
+            let at_rest = normal_of(&one, rest).angle_between(normal_of(&two, rest));
+            let is_feature = one.tag != two.tag || at_rest.cos() < 0.766;
+            let is_sound = self.is_sound(&one) && self.is_sound(&two);
+            let far = |triangle: &BoundaryTriangle| {
+                let mut corners = triangle.particles.into_iter();
+                let far = corners.find(|p| !ends.contains(&p.0)).unwrap();
+                let [a, b] = ends.map(|p| positions[p as usize]);
+                (self.at(far) - a).reject_from(b - a).normalize()
+            };
+            if !(is_feature && is_sound) {
+                continue;
+            }
+            let n = normal_of(&one, positions);
+            if n.dot(far(&two)) < -1e-3 {
+                features.push((ends, [one, two], [far(&one), far(&two)]));
+            }
+        }
+        let mut found = BTreeSet::new();
+        for (i, (ends, tets, far)) in features.iter().enumerate() {
+            for (others, other_tets, other_far) in &features[i + 1..] {
+                let none = BTreeSet::new();
+                let held = |p: &u32| self.partners.get(p).unwrap_or(&none).clone();
+                let meets =
+                    |p: &u32| others.contains(p) || held(p).iter().any(|q| others.contains(q));
+                if ends.iter().any(meets)
+                    || !self.may_touch(ends[0], tets[0].tet, other_tets[0].tet)
+                {
+                    continue;
+                }
+                let [a, b] = ends.map(|p| positions[p as usize]);
+                let [c, d] = others.map(|p| positions[p as usize]);
+                let across = (b - a).normalize().cross((d - c).normalize());
+                if across.length() <= 0.05 {
+                    continue;
+                }
+                // Where both lines are closest, in coordinates along them.
+                let lines = glam::DMat3::from_cols(b - a, c - d, across).inverse() * (c - a);
+                let clamped = |p: f64| p.clamp(0.0, 1.0);
+                let to = |x: DVec3, from: DVec3, end: DVec3| {
+                    let t = (x - from).dot(end - from) / (end - from).length_squared();
+                    from.lerp(end, clamped(t)).distance(x)
+                };
+                let meet = [lines.x, lines.y].iter().all(|p| (0.0..=1.0).contains(p));
+                let (p, q) = (a.lerp(b, clamped(lines.x)), c.lerp(d, clamped(lines.y)));
+                let mut distance = to(a, c, d)
+                    .min(to(b, c, d))
+                    .min(to(c, a, b))
+                    .min(to(d, a, b));
+                if meet {
+                    distance = distance.min(p.distance(q));
+                }
+                if distance > self.scene.contacts.reach() {
+                    continue;
+                }
+                let is_above = |n: DVec3| {
+                    far.iter().all(|far| far.dot(n) >= -0.1)
+                        && other_far.iter().all(|far| far.dot(n) <= 0.1)
+                };
+                let n = across.normalize();
+                let n = match [is_above(n), is_above(-n)] {
+                    [true, false] => n,
+                    [false, true] => -n,
+                    _ => continue,
+                };
+                let gap = n.dot(p - q);
+                // From one edge to the other through the tets behind the one, and as far again.
+                let has_way =
+                    |tets: &[BoundaryTriangle; 2], [from, to]: [DVec3; 2], own: &[u32; 2]| {
+                        let ways = |to: DVec3| -> Vec<TetId> {
+                            let starts = tets.iter().map(|triangle| triangle.tet);
+                            starts.flat_map(|tet| self.reached(tet, from, to)).collect()
+                        };
+                        let is_other = |tet: &TetId| {
+                            let corners = self.scene.body.mesh().tets[tet.index()];
+                            own.iter().all(|p| !corners.contains(&ParticleId(*p)))
+                        };
+                        ways(to).iter().any(is_other) && !ways(from + (to - from) * 2.0).is_empty()
+                    };
+                let is_valid = if gap >= 0.0 {
+                    true
+                } else if meet {
+                    has_way(other_tets, [q, p], ends) || has_way(tets, [p, q], others)
+                } else {
+                    gap > -0.01 * self.scene.contacts.mean_edge()
+                };
+                if is_valid {
+                    found.insert([ends[0], ends[1], others[0], others[1]]);
+                }
+            }
+        }
+        found
     }
 
     /// The tets that contain the end of a segment and are reached from a tet along it: each tet that the segment passes

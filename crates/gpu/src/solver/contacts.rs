@@ -1,4 +1,4 @@
-//! [`Contacts`]: pairs and vertices against triangles on the device.
+//! [`Contacts`]: pairs, vertices against triangles and edges against edges on the device.
 //!
 //! The host finds contacts, colors them and hands them to its solver; here they are stored in solving order, each color
 //! padded to whole groups of 64. A color is a dispatch, and consecutive colors of one group are one dispatch together.

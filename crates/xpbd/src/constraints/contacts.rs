@@ -1,12 +1,18 @@
 //! [`Contacts`]: bodies made of tets that touch, hard and one-sided, with Coulomb friction.
 //!
 //! A contact is a linear combination of particles along a normal, `C = n · Σ sₖ xₖ - h ≥ 0` with `Σ sₖ = 0`: a vertex
-//! against the point below it on a triangle, or a particle against its partner on the other side of a fresh cut. The
-//! point on the triangle is found in each solve: the foot of the vertex in the plane of the triangle. Where the foot lies
-//! beyond a side by more than a quarter of the altitude, a point on the sides moved outward by a quarter takes its place:
-//! weights below -1/4 become -1/4, and the others shrink towards -1/4 in proportion until the sum is 1 again. That point
-//! is not the closest one, which would need a distinction of cases; it decides how the force is distributed, and it does
-//! not change `C`, since all of the plane has the same distance.
+//! against the point below it on a triangle, two edges at the points where they are closest, or a particle against its
+//! partner on the other side of a fresh cut.
+//!
+//! The point on the triangle is found in each solve: the foot of the vertex in the plane of the triangle. Where the foot
+//! lies beyond a side by more than a quarter of the altitude, a point on the sides moved outward by a quarter takes its
+//! place: weights below -1/4 become -1/4, and the others shrink towards -1/4 in proportion until the sum is 1 again. That
+//! point is not the closest one, which would need a distinction of cases; it decides how the force is distributed, and it
+//! does not change `C`, since all of the plane has the same distance.
+//!
+//! Two edges touch while the points where their lines are closest lie on both; otherwise a corner of one of them is what
+//! touches, and that is the contact of a vertex. Their normal is given, for the sign of the cross product of both
+//! directions tells inside from outside only as long as they have not turned past each other.
 //!
 //! Near a convex edge a vertex is outside if it is outside of one of both surfaces that meet there. So a contact may
 //! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that takes
@@ -24,7 +30,7 @@
 //! `wₖ sₖ Δλ n`, and of what the two sides slid along each other in this substep up to `μ λ W` is taken back. That is
 //! the law that colliders have. The relaxation of the solver does not scale contacts: damped contacts sink in.
 //!
-//! Colors are solved one after the other, pairs before faces; contacts of a color beyond the sixteenth of their kind
+//! Colors are solved one after the other, pairs before the others; contacts of a color beyond the sixteenth of their kind
 //! form a tail that one thread solves, since a vertex that touches dozens of triangles needs dozens of colors of few
 //! contacts each.
 //!
@@ -51,6 +57,8 @@ const PARALLEL_COLORS: usize = 16;
 const CONTACTS_A_THREAD: usize = 128;
 /// By how much the foot of a vertex may lie outside of a side of its triangle, in altitudes.
 const MARGIN: f64 = 0.25;
+/// The sine of the angle between two edges up to which they count as parallel.
+const PARALLEL: f64 = 0.01;
 
 /// The law of all contacts of a solver. See [`crate::Solver::set_contacts`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,29 +109,78 @@ pub struct FaceContact {
     pub thickness: f64,
 }
 
+/// Two edges that stay on their sides of each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EdgeContact {
+    /// The ends of the one edge, then those of the other.
+    pub particles: [u32; 4],
+    /// From the second edge to the side that the first one stays on, of any length but 0.
+    pub normal: DVec3,
+    /// The distance that is kept in m, at least 0.
+    pub thickness: f64,
+}
+
+/// A contact between two surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum SurfaceContact {
+    /// A vertex and a triangle.
+    Face(FaceContact),
+    /// Two edges.
+    Edges(EdgeContact),
+}
+
+impl SurfaceContact {
+    /// The particles, as [`FaceContact::particles`] or [`EdgeContact::particles`].
+    #[must_use]
+    pub fn particles(&self) -> [u32; 4] {
+        match self {
+            Self::Face(contact) => contact.particles,
+            Self::Edges(contact) => contact.particles,
+        }
+    }
+}
+
+impl From<FaceContact> for SurfaceContact {
+    fn from(contact: FaceContact) -> Self {
+        Self::Face(contact)
+    }
+}
+
+impl From<EdgeContact> for SurfaceContact {
+    fn from(contact: EdgeContact) -> Self {
+        Self::Edges(contact)
+    }
+}
+
 /// A contact after a frame. See [`crate::Solver::contacts`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactState {
-    /// The vertex, or the second particle of a pair.
+    /// The vertex, the first end of the first edge, or the second particle of a pair.
     pub vertex: u32,
-    /// The first corner of the triangle, or the first particle of a pair.
+    /// The first corner of the triangle, the first end of the second edge, or the first particle of a pair.
     pub against: u32,
+    /// Where the force acts in m: at the vertex, or at the closest point of the first edge.
+    pub point: DVec3,
     /// How far the vertex is on the wrong side in m; negative if the two are apart, not above 0 if the vertex lies beside
     /// the triangle.
     pub depth: f64,
     /// The normal force in N, summed up over the substeps since the contacts were set and divided by those of the frame:
     /// the mean of a frame, or in a frame of several parts the share of the last part. 0 if the contact did not press.
     pub pressure: f64,
-    /// The force in N on the vertex with friction, as `pressure`. The other side has its opposite.
+    /// The force in N on the vertex or on the first edge with friction, as `pressure`. The other side has its opposite.
     pub force: DVec3,
 }
 
 /// A contact as plain numbers for a kernel. See [`crate::Solver::contact_data`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactData<R> {
-    /// The particles: the two of a pair and twice [`u32::MAX`], or a vertex and the corners of a triangle.
+    /// The particles: the two of a pair and twice [`u32::MAX`], a vertex and the corners of a triangle, or the ends of two
+    /// edges.
     pub particles: [u32; 4],
-    /// Of a pair the unit normal and zeros; of a vertex and a triangle [`FaceContact::beyond`] and the thickness, then
+    /// Of a pair the unit normal and zeros; of two edges the unit normal, the thickness, three zeros and -1; of a vertex
+    /// and a triangle [`FaceContact::beyond`] and the thickness, then
     /// [`FaceContact::limit`]. Three zeros stand for a direction that there is none of.
     pub numbers: [R; 8],
 }
@@ -214,7 +271,7 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// The first or the second plane; `None` where a triangle has no normal.
     fn plane(&self, x: [R::Vector; K], is_second: bool) -> Option<ContactPlane<R, K>>;
     /// Whether the first particle is above or below the other side, not beside it.
-    fn faces(&self, x: [R::Vector; K]) -> bool;
+    fn is_opposite(&self, x: [R::Vector; K]) -> bool;
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -228,14 +285,15 @@ struct Pair<R: Float> {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-struct Face<R: Float> {
+struct Surface<R: Float> {
     particles: [u32; 4],
-    /// Zeros where there is none.
+    /// Zeros where there is none. Of two edges the unit normal.
     beyond: [R; 3],
     /// Zeros where there is none.
     limit: [R; 3],
     distance: R,
     thickness: R,
+    is_edges: bool,
 }
 
 impl<R: Float> Pair<R> {
@@ -247,8 +305,8 @@ impl<R: Float> Pair<R> {
     }
 }
 
-impl<R: Float> Face<R> {
-    fn new(index: usize, contact: &FaceContact) -> Result<Self, XpbdError> {
+impl<R: Float> Surface<R> {
+    fn new(index: usize, contact: &SurfaceContact) -> Result<Self, XpbdError> {
         let refuse = |what, value, range| {
             Err(XpbdError::Constraint {
                 index,
@@ -257,9 +315,27 @@ impl<R: Float> Face<R> {
                 range,
             })
         };
-        if !(contact.thickness.is_finite() && contact.thickness >= 0.0) {
-            return refuse("thickness", contact.thickness, "at least 0 and finite");
+        let thickness = match contact {
+            SurfaceContact::Face(contact) => contact.thickness,
+            SurfaceContact::Edges(contact) => contact.thickness,
+        };
+        if !(thickness.is_finite() && thickness >= 0.0) {
+            return refuse("thickness", thickness, "at least 0 and finite");
         }
+        let thickness = R::from_f64(thickness);
+        let contact = match contact {
+            SurfaceContact::Face(contact) => contact,
+            SurfaceContact::Edges(contact) => {
+                return Ok(Self {
+                    particles: contact.particles,
+                    beyond: R::components(unit::<R>(index, contact.normal)?),
+                    limit: [R::ZERO; 3],
+                    distance: R::ZERO,
+                    thickness,
+                    is_edges: true,
+                });
+            }
+        };
         let limit = contact.limit.map(|limit| limit.normal);
         let distance = contact.limit.map_or(0.0, |limit| limit.distance);
         if !(distance.is_finite() && distance >= 0.0) {
@@ -280,7 +356,8 @@ impl<R: Float> Face<R> {
             beyond,
             limit,
             distance: R::from_f64(distance),
-            thickness: R::from_f64(contact.thickness),
+            thickness,
+            is_edges: false,
         })
     }
 }
@@ -310,7 +387,7 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
         })
     }
 
-    fn faces(&self, _x: [R::Vector; 2]) -> bool {
+    fn is_opposite(&self, _x: [R::Vector; 2]) -> bool {
         true
     }
 }
@@ -333,7 +410,7 @@ fn clamped<R: Float>(x: R, low: R, high: R) -> R {
     if x > high { high } else { x }
 }
 
-impl<R: Float> Face<R> {
+impl<R: Float> Surface<R> {
     /// The plane of the triangle.
     #[inline]
     fn own_plane(&self, [e1, e2, r]: Basis<R>) -> Option<ContactPlane<R, 4>> {
@@ -382,6 +459,49 @@ impl<R: Float> Face<R> {
         R::dot(outward, r - e1 * part) > self.distance + self.thickness
     }
 
+    /// The plane between two edges through their closest points, and whether these lie beyond an end of one of them;
+    /// `None` if they are parallel.
+    fn edge_plane(&self, [x0, x1, x2, x3]: [R::Vector; 4]) -> Option<(ContactPlane<R, 4>, bool)> {
+        let (length, along) = direction::<R>(x1 - x0)?;
+        let (other_length, other) = direction::<R>(x3 - x2)?;
+        let across = R::cross(along, other);
+        let square = R::dot(across, across);
+        let are_parallel = square <= R::from_f64(PARALLEL * PARALLEL);
+        if are_parallel || !square.is_finite() {
+            return None;
+        }
+        let r = x0 - x2;
+        let first = -(R::dot(r, R::cross(other, across)) / square) / length;
+        let second = -(R::dot(r, R::cross(along, across)) / square) / other_length;
+        if !(first.is_finite() && second.is_finite()) {
+            return None;
+        }
+        let on_edge = |part: R| part >= R::ZERO && part <= R::ONE;
+        let is_past = !(on_edge(first) && on_edge(second));
+        let [first, second] = [first, second].map(|part| clamped(part, R::ZERO, R::ONE));
+        let [x, y, z] = self.beyond;
+        let plane = ContactPlane {
+            normal: R::vector(x, y, z),
+            shares: [R::ONE - first, first, second - R::ONE, -second],
+            is_second: false,
+        };
+        Some((plane, is_past))
+    }
+
+    fn edge_gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
+        let (plane, is_past) = self.edge_plane(x)?;
+        let [_, first, _, second] = plane.shares;
+        let between = |x: [R::Vector; 4]| {
+            let way = (x[0] - x[2]) + (x[1] - x[0]) * first + (x[3] - x[2]) * second;
+            R::dot(plane.normal, way) - self.thickness
+        };
+        Some(Gap {
+            plane,
+            residual: new_part(between(x), between(previous), kept),
+            is_past,
+        })
+    }
+
     /// The distance of the vertex from a plane, less the thickness.
     #[inline]
     fn above(&self, plane: &ContactPlane<R, 4>, [e1, e2, r]: Basis<R>) -> R {
@@ -390,13 +510,16 @@ impl<R: Float> Face<R> {
     }
 }
 
-impl<R: Float> Contact<R, 4> for Face<R> {
+impl<R: Float> Contact<R, 4> for Surface<R> {
     fn particles(&self) -> [u32; 4] {
         self.particles
     }
 
     #[inline]
     fn gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
+        if self.is_edges {
+            return self.edge_gap(x, previous, kept);
+        }
         let (now, old) = (basis::<R>(x), basis::<R>(previous));
         let at = |plane: ContactPlane<R, 4>| Gap {
             residual: new_part(self.above(&plane, now), self.above(&plane, old), kept),
@@ -418,6 +541,9 @@ impl<R: Float> Contact<R, 4> for Face<R> {
 
     #[inline]
     fn plane(&self, x: [R::Vector; 4], is_second: bool) -> Option<ContactPlane<R, 4>> {
+        if self.is_edges {
+            return self.edge_plane(x).map(|(plane, _)| plane);
+        }
         let basis = basis::<R>(x);
         if is_second {
             self.plane_beyond(basis)
@@ -426,7 +552,10 @@ impl<R: Float> Contact<R, 4> for Face<R> {
         }
     }
 
-    fn faces(&self, x: [R::Vector; 4]) -> bool {
+    fn is_opposite(&self, x: [R::Vector; 4]) -> bool {
+        if self.is_edges {
+            return true;
+        }
         let [e1, e2, r] = basis::<R>(x);
         let Some((size, normal)) = direction::<R>(R::cross(e1, e2)) else {
             return false;
@@ -489,7 +618,7 @@ pub(crate) struct Contacts<R: Float> {
     law: Option<ContactLaw>,
     /// In solving order.
     pairs: Vec<Pair<R>>,
-    faces: Vec<Face<R>>,
+    surfaces: Vec<Surface<R>>,
     rounds: Vec<Round>,
     /// Of each kind.
     colors: [usize; 2],
@@ -513,7 +642,7 @@ impl<R: Float> Default for Contacts<R> {
         Self {
             law: None,
             pairs: Vec::new(),
-            faces: Vec::new(),
+            surfaces: Vec::new(),
             rounds: Vec::new(),
             colors: [0; 2],
             taken: Vec::new(),
@@ -530,7 +659,7 @@ impl<R: Float> Clone for Contacts<R> {
         Self {
             law: self.law,
             pairs: self.pairs.clone(),
-            faces: self.faces.clone(),
+            surfaces: self.surfaces.clone(),
             rounds: self.rounds.clone(),
             colors: self.colors,
             ..Self::default()
@@ -584,12 +713,12 @@ impl<R: Float> Contacts<R> {
         self.law.is_some()
     }
 
-    /// Number of pairs and of faces.
+    /// Number of pairs and of contacts between surfaces.
     pub(crate) fn counts(&self) -> [usize; 2] {
-        [self.pairs.len(), self.faces.len()]
+        [self.pairs.len(), self.surfaces.len()]
     }
 
-    /// Number of colors, of pairs and of faces together.
+    /// Number of colors, of pairs and of surfaces together.
     pub(crate) fn color_count(&self) -> usize {
         self.colors.iter().sum()
     }
@@ -605,9 +734,9 @@ impl<R: Float> Contacts<R> {
         particle_count: usize,
         law: &ContactLaw,
         pairs: (&[PairContact], &Coloring),
-        faces: (&[FaceContact], &Coloring),
+        surfaces: (&[SurfaceContact], &Coloring),
     ) -> Result<(), XpbdError> {
-        let result = self.try_set(particle_count, law, pairs, faces);
+        let result = self.try_set(particle_count, law, pairs, surfaces);
         if result.is_err() {
             self.clear();
         }
@@ -619,13 +748,13 @@ impl<R: Float> Contacts<R> {
         particle_count: usize,
         law: &ContactLaw,
         pairs: (&[PairContact], &Coloring),
-        faces: (&[FaceContact], &Coloring),
+        surfaces: (&[SurfaceContact], &Coloring),
     ) -> Result<(), XpbdError> {
         law.check()?;
         self.law = Some(*law);
         let lists = [
             (pairs.0.len(), pairs.1.vertex_count()),
-            (faces.0.len(), faces.1.vertex_count()),
+            (surfaces.0.len(), surfaces.1.vertex_count()),
         ];
         for (expected, found) in lists {
             if expected != found {
@@ -640,17 +769,30 @@ impl<R: Float> Contacts<R> {
         self.taken.resize(particle_count, 0);
         let taken = &mut self.taken;
         take_colors(taken, pairs.0, |c| c.particles, pairs.1, 0)?;
-        take_colors(taken, faces.0, |c| c.particles, faces.1, PARALLEL_COLORS)?;
+        take_colors(
+            taken,
+            surfaces.0,
+            SurfaceContact::particles,
+            surfaces.1,
+            PARALLEL_COLORS,
+        )?;
         let Self {
             rounds,
             pairs: own_pairs,
-            faces: own_faces,
+            surfaces: own_surfaces,
             ..
         } = self;
         rounds.clear();
         arrange(pairs.0, pairs.1, Pair::new, own_pairs, rounds, true)?;
-        arrange(faces.0, faces.1, Face::new, own_faces, rounds, false)?;
-        self.colors = [pairs.1.color_count(), faces.1.color_count()];
+        arrange(
+            surfaces.0,
+            surfaces.1,
+            Surface::new,
+            own_surfaces,
+            rounds,
+            false,
+        )?;
+        self.colors = [pairs.1.color_count(), surfaces.1.color_count()];
         // Those of the frame before belong to other contacts.
         self.impulses.clear();
         Ok(())
@@ -666,14 +808,19 @@ impl<R: Float> Contacts<R> {
                 numbers: [x, y, z, o, o, o, o, o],
             }
         });
-        let faces = self.faces.iter().map(|face| {
-            let ([a, b, c], [d, e, f]) = (face.beyond, face.limit);
+        let surfaces = self.surfaces.iter().map(|surface| {
+            let ([a, b, c], [d, e, f]) = (surface.beyond, surface.limit);
+            let last = if surface.is_edges {
+                -R::ONE
+            } else {
+                surface.distance
+            };
             ContactData {
-                particles: face.particles,
-                numbers: [a, b, c, face.thickness, d, e, f, face.distance],
+                particles: surface.particles,
+                numbers: [a, b, c, surface.thickness, d, e, f, last],
             }
         });
-        pairs.chain(faces)
+        pairs.chain(surfaces)
     }
 
     /// The rounds of the solving order.
@@ -702,7 +849,7 @@ impl<R: Float> Contacts<R> {
 
     /// Takes the impulses of a frame or a part that was computed elsewhere.
     pub(crate) fn load(&mut self, impulses: &[[R; 4]], settings: &StepSettings) {
-        assert_eq!(impulses.len(), self.pairs.len() + self.faces.len());
+        assert_eq!(impulses.len(), self.pairs.len() + self.surfaces.len());
         self.impulses.clear();
         self.impulses
             .extend(impulses.iter().copied().map(R::particle));
@@ -719,11 +866,21 @@ impl<R: Float> Contacts<R> {
             self.state(particles, i, pair, [b, a])
         });
         let first = self.pairs.len();
-        let faces = self.faces.iter().enumerate().map(move |(i, face)| {
-            let [vertex, corner, ..] = face.particles;
-            self.state(particles, first + i, face, [vertex, corner])
+        let surfaces = self.surfaces.iter().enumerate().map(move |(i, surface)| {
+            let [vertex, corner, end, _] = surface.particles;
+            let against = if surface.is_edges { end } else { corner };
+            let mut state = self.state(particles, first + i, surface, [vertex, against]);
+            if surface.is_edges {
+                let x = surface.particles.map(|p| particles.vector(p as usize));
+                let part = surface
+                    .edge_plane(x)
+                    .map_or(R::ZERO, |(plane, _)| plane.shares[1]);
+                let end = particles.position(corner as usize);
+                state.point = state.point.lerp(end, part.to_f64());
+            }
+            state
         });
-        pairs.chain(faces)
+        pairs.chain(surfaces)
     }
 
     fn state<const K: usize>(
@@ -737,7 +894,7 @@ impl<R: Float> Contacts<R> {
         let gap = contact.gap(x, x, R::ZERO);
         let mut depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
         // Below the plane of a triangle but beside the triangle, a vertex is not inside.
-        if gap.is_some_and(|gap| gap.is_past) || !contact.faces(x) {
+        if gap.is_some_and(|gap| gap.is_past) || !contact.is_opposite(x) {
             depth = depth.min(0.0);
         }
         let [x, y, z, normal] = self
@@ -748,6 +905,7 @@ impl<R: Float> Contacts<R> {
         ContactState {
             vertex,
             against,
+            point: particles.position(vertex as usize),
             depth,
             pressure: normal,
             force: DVec3::new(x, y, z),
@@ -774,15 +932,16 @@ impl<R: Float> Contacts<R> {
         let was_second = signed < R::ZERO;
         let mut before = if was_second { -signed } else { signed };
         let mut friction = R::vector(hx, hy, hz);
+        let has_pressed = before > R::ZERO;
         // Open, and no impulse to take back.
-        if gap.is_open() && !(before > R::ZERO) {
+        if gap.is_open() && !has_pressed {
             return;
         }
         if !gap.residual.is_finite() {
             return;
         }
         let weights = cells.map(|cell| weight::<R>(cell));
-        if before > R::ZERO && (gap.is_past || gap.plane.is_second != was_second) {
+        if has_pressed && (gap.is_past || gap.plane.is_second != was_second) {
             // What pressed along another plane, or on a surface that has ended, is taken back where it acted.
             let Some(plane) = contact.plane(x, was_second) else {
                 return;
@@ -957,7 +1116,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
         if self.law.is_none() {
             return 0;
         }
-        let count = self.pairs.len() + self.faces.len();
+        let count = self.pairs.len() + self.surfaces.len();
         let nothing = || R::particle([R::ZERO; 4]);
         // Those of a part of a frame are forgotten when contacts are set.
         if substep.number == 0 || self.impulses.len() != count {
@@ -985,7 +1144,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
             let most = if round.is_tail { 1 } else { threads };
             ((round.to - round.from) / CONTACTS_A_THREAD).clamp(1, most)
         };
-        let first_face = this.pairs.len();
+        let first_surface = this.pairs.len();
         let work = |number: usize, chunk: usize| {
             let (round, chunks) = (this.rounds[number], chunks(number));
             let share = |part: usize| round.from + (round.to - round.from) * part / chunks;
@@ -996,8 +1155,8 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
                 }
             } else {
                 for index in range {
-                    let face = &this.faces[index];
-                    this.solve_one(first_face + index, face, particles, factors);
+                    let surface = &this.surfaces[index];
+                    this.solve_one(first_surface + index, surface, particles, factors);
                 }
             }
         };
@@ -1014,6 +1173,6 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&*self.pairs) + size_of_val(&*self.faces) + size_of_val(&*self.rounds)
+        size_of_val(&*self.pairs) + size_of_val(&*self.surfaces) + size_of_val(&*self.rounds)
     }
 }
