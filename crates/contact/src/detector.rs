@@ -12,8 +12,8 @@
 //! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
 //! distance and face.
 //!
-//! Cost: an update without a search is a pass over the surface vertices, the candidates and the twins; a search is a
-//! refit of the tree and a query for each surface vertex, on all threads; a delta costs what the boundary lost and
+//! Cost: an update without a search is two passes over the surface vertices, and one over the candidates and the twins; a
+//! search is a refit of the trees and a query for each surface vertex and each feature edge, on all threads; a delta costs what the boundary lost and
 //! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
 //! cut builds a tree over the new triangles, and over all of them once these are more than a
 //! quarter.

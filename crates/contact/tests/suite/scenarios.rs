@@ -599,6 +599,25 @@ fn what_asks_for_no_search() {
     }
 }
 
+/// A body that tumbles does not approach itself.
+#[test]
+fn tumbling_asks_for_no_search() {
+    let mut scene = Scene::new(&[jittered_box(4, 0.2, 7)], ContactSettings::default());
+    assert!(scene.update().searched);
+    let rest = scene.positions.clone();
+    let spin = DVec3::new(0.6, -1.0, 0.8);
+    for frame in 1..=10 {
+        let turn = DQuat::from_scaled_axis(spin * FRAME * f64::from(frame));
+        for (p, rest) in rest.iter().enumerate() {
+            let from = turn * (*rest - 0.5);
+            scene.positions[p] = from + DVec3::new(0.5, 0.5, 0.5 - 0.1 * f64::from(frame));
+            scene.velocities[p] = spin.cross(from) - DVec3::Z * (0.1 / FRAME);
+        }
+        // Half a square of the angle over the body at most, which is a fifth of the skin here.
+        assert!(!scene.update().searched, "frame {frame}");
+    }
+}
+
 /// A vertex that slides by half a barycentric coordinate on a sliver has hardly moved: no search.
 #[test]
 fn slivers_ask_for_no_search() {

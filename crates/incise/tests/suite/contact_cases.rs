@@ -12,10 +12,7 @@ use incise::{Body, Simulation, SimulationBuilder};
 use crate::contact::{GRAVITY, center, cut, intruders, solver};
 
 fn with_friction(friction: f64) -> ContactSpec {
-    ContactSpec {
-        friction,
-        ..ContactSpec::default()
-    }
+    ContactSpec::default().with(|spec| spec.friction = friction)
 }
 
 /// Steps, with or without the warning that slivers of a cut are not as accurate as wanted.
@@ -37,11 +34,16 @@ fn mean_force(simulation: &mut Simulation, pieces: [u32; 2], frames: u32) -> DVe
     sum / f64::from(frames)
 }
 
+/// The attachment, moved by a way in the first twenty frames.
+fn moved(attachment: AttachmentSpec, by: DVec3) -> AttachmentSpec {
+    attachment.with(|spec| {
+        spec.frames = [0, 20];
+        spec.path = vec![[0.0; 3], by.to_array()];
+    })
+}
+
 fn half_space(point: DVec3, normal: DVec3) -> Region {
-    Region::HalfSpace {
-        point: point.to_array(),
-        normal: normal.to_array(),
-    }
+    Region::half_space(point.to_array(), normal.to_array())
 }
 
 /// A column cut across at tan φ = 1/2 holds for a friction above that and slides for one below.
@@ -106,11 +108,10 @@ fn pressed_bar(is_cut: bool) -> (Simulation, incise::AttachmentHandle) {
     let mut builder = Simulation::builder();
     builder
         .solver(solver(Precision::F64, 20))
-        .report(ReportSpec {
-            every: 1,
-            quantities: vec![Quantity::Force],
-            ..ReportSpec::default()
-        });
+        .report(ReportSpec::default().with(|spec| {
+            spec.every = 1;
+            spec.quantities = vec![Quantity::Force];
+        }));
     let bar = kuhn_box([8, 3, 3], dvec3(0.4, 0.15, 0.15));
     builder.add_body(Body::new(bar).young_modulus(1e5).damping(0.02));
     builder.contact(with_friction(0.5));
@@ -118,19 +119,16 @@ fn pressed_bar(is_cut: bool) -> (Simulation, incise::AttachmentHandle) {
         0,
         vec![half_space(DVec3::X * 0.01, DVec3::NEG_X)],
     ));
-    let pressing = builder.add_attachment(AttachmentSpec {
-        frames: [0, 20],
-        path: vec![[0.0; 3], [-0.02, 0.0, 0.0]],
-        ..AttachmentSpec::new(0, vec![half_space(DVec3::X * 0.39, DVec3::X)])
-    });
+    let pressing = builder.add_attachment(moved(
+        AttachmentSpec::new(0, vec![half_space(DVec3::X * 0.39, DVec3::X)]),
+        DVec3::X * -0.02,
+    ));
     if is_cut {
-        builder.add_stroke(StrokeSpec::Sweep {
-            frames: [30, 50],
-            blade: vec![[0.19, -0.1, 0.2], [0.19, 0.3, 0.2]],
-            path: vec![[0.0; 3], [0.0, 0.0, -0.3]],
-            snap: 0.1,
-            solid: None,
-        });
+        builder.add_stroke(StrokeSpec::sweep(
+            [30, 50],
+            vec![[0.19, -0.1, 0.2], [0.19, 0.3, 0.2]],
+            vec![[0.0; 3], [0.0, 0.0, -0.3]],
+        ));
     }
     (builder.build().unwrap(), pressing)
 }
@@ -174,18 +172,16 @@ fn a_twisted_rod_is_sliced() {
     builder.contact(with_friction(0.2));
     for side in [0.0, 0.6] {
         let outward = DVec3::X * if side == 0.0 { -1.0 } else { 1.0 };
-        builder.add_attachment(AttachmentSpec {
-            frames: [0, 60],
-            rotation: Some(PathRotationSpec {
-                axis: [1.0, 0.0, 0.0],
-                angle_degrees: 90.0 * outward.x,
-                center: [0.0, 0.02, 0.02],
-            }),
-            ..AttachmentSpec::new(
-                0,
-                vec![half_space(DVec3::X * side - outward * 0.01, outward)],
-            )
+        let end = half_space(DVec3::X * side - outward * 0.01, outward);
+        let turn = PathRotationSpec::default().with(|spec| {
+            spec.axis = [1.0, 0.0, 0.0];
+            spec.angle_degrees = 90.0 * outward.x;
+            spec.center = [0.0, 0.02, 0.02];
         });
+        builder.add_attachment(AttachmentSpec::new(0, vec![end]).with(|spec| {
+            spec.frames = [0, 60];
+            spec.rotation = Some(turn);
+        }));
     }
     for slice in 1..20_u32 {
         let at = 0.6 * f64::from(slice) / 20.0 + 0.0007;
@@ -218,11 +214,10 @@ fn unlike_meshes_press_uniformly() {
     let bottom = half_space(DVec3::Z * 0.001, DVec3::NEG_Z);
     builder.add_attachment(AttachmentSpec::new(0, vec![bottom]));
     let press = 0.01;
-    builder.add_attachment(AttachmentSpec {
-        frames: [0, 20],
-        path: vec![[0.0; 3], [0.0, 0.0, -press]],
-        ..AttachmentSpec::new(1, vec![half_space(DVec3::Z * 0.199, DVec3::Z)])
-    });
+    builder.add_attachment(moved(
+        AttachmentSpec::new(1, vec![half_space(DVec3::Z * 0.199, DVec3::Z)]),
+        DVec3::Z * -press,
+    ));
     let mut simulation = builder.build().unwrap();
     steps(&mut simulation, 120);
     let rest = simulation.mesh().positions.clone();

@@ -63,10 +63,7 @@ fn crossing_bars(precision: Precision) -> SimulationBuilder {
     // Both edges cross between two particles each.
     let above = Body::new(bar(false)).position(dvec3(0.06, 0.06, 0.005));
     builder.add_body(above.young_modulus(3e5));
-    builder.contact(ContactSpec {
-        friction: 0.5,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
     builder
 }
 

@@ -163,8 +163,8 @@ pub struct ContactState {
     pub against: u32,
     /// Where the force acts in m: at the vertex, or at the closest point of the first edge.
     pub point: DVec3,
-    /// How far the vertex is on the wrong side in m; negative if the two are apart, not above 0 if the vertex lies beside
-    /// the triangle.
+    /// How far the vertex or the edge is on the wrong side in m; negative if the two are apart, not above 0 if the vertex
+    /// lies beside the triangle, or edges pass each other beyond their ends.
     pub depth: f64,
     /// The normal force in N, summed up over the substeps since the contacts were set and divided by those of the frame:
     /// the mean of a frame, or in a frame of several parts the share of the last part. 0 if the contact did not press.
@@ -180,8 +180,8 @@ pub struct ContactData<R> {
     /// edges.
     pub particles: [u32; 4],
     /// Of a pair the unit normal and zeros; of two edges the unit normal, the thickness, three zeros and -1; of a vertex
-    /// and a triangle [`FaceContact::beyond`] and the thickness, then
-    /// [`FaceContact::limit`]. Three zeros stand for a direction that there is none of.
+    /// and a triangle [`FaceContact::beyond`] and the thickness, then [`FaceContact::limit`]. Three zeros stand for no
+    /// direction.
     pub numbers: [R; 8],
 }
 
@@ -870,13 +870,15 @@ impl<R: Float> Contacts<R> {
             let [vertex, corner, end, _] = surface.particles;
             let against = if surface.is_edges { end } else { corner };
             let mut state = self.state(particles, first + i, surface, [vertex, against]);
-            if surface.is_edges {
-                let x = surface.particles.map(|p| particles.vector(p as usize));
-                let part = surface
-                    .edge_plane(x)
-                    .map_or(R::ZERO, |(plane, _)| plane.shares[1]);
+            let x = surface.particles.map(|p| particles.vector(p as usize));
+            if let Some((plane, is_past)) = surface.edge_plane(x).filter(|_| surface.is_edges) {
+                let [_, first, _, second] = plane.shares;
                 let end = particles.position(corner as usize);
-                state.point = state.point.lerp(end, part.to_f64());
+                state.point = state.point.lerp(end, first.to_f64());
+                if is_past {
+                    let way = (x[0] - x[2]) + (x[1] - x[0]) * first + (x[3] - x[2]) * second;
+                    state.depth = state.depth.min(-R::to_dvec3(way).length());
+                }
             }
             state
         });
