@@ -74,14 +74,14 @@ fn a_bar_lies_across_another_one() {
         let mut simulation = crossing_bars(precision).build().unwrap();
         let rest = simulation.positions();
         let count = rest.len() / 2;
-        let lower = on_edge(&rest, 0..count, |x| x.z > -1e-9, DVec3::Y);
-        let upper = on_edge(&rest, count..2 * count, |x| x.z < 0.005 + 1e-9, DVec3::X);
+        let lower = on_edge(rest, 0..count, |x| x.z > -1e-9, DVec3::Y);
+        let upper = on_edge(rest, count..2 * count, |x| x.z < 0.005 + 1e-9, DVec3::X);
         assert_eq!((lower.len(), upper.len()), (5, 5));
-        assert!((clearance(&rest, &upper, &lower) - 0.005).abs() < 1e-9);
+        assert!((clearance(rest, &upper, &lower) - 0.005).abs() < 1e-9);
         let mut landed = false;
         for frame in 0..40 {
             steps(&mut simulation, 1);
-            let least = clearance(&simulation.positions(), &upper, &lower);
+            let least = clearance(simulation.positions(), &upper, &lower);
             assert!(least > -1e-3, "{least} in frame {frame}");
             landed |= least < 1e-4;
         }
