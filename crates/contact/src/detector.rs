@@ -781,7 +781,7 @@ impl ContactDetector {
 /// How parts that are near each other move, see [`ContactDetector::survey`].
 #[derive(Clone, Copy, Default)]
 struct Moved {
-    /// How much closer two of them may come in the frame in m, as far as the search looks ahead at most.
+    /// How much closer two of them may come in the frame in m, at most what the search looks ahead.
     margin: f64,
     /// How far a search must have reached in m to know of all that may come into contact in the frame.
     needed: f64,

@@ -241,7 +241,7 @@ struct ContactPlane<R: Float, const K: usize> {
     normal: R::Vector,
     /// The gradient at each particle is the normal times this; their sum is 0.
     shares: [R; K],
-    /// Whether it is the second plane of the contact.
+    /// True for the second plane of the contact.
     is_second: bool,
 }
 

@@ -430,7 +430,7 @@ fn a_vertex_on_an_edge_presses_on_the_edge() {
     }
 }
 
-/// A vertex below the plane of a triangle is held as far as the limit and not past it, whatever the plane says.
+/// A vertex below the plane of a triangle is held up to the limit and not past it, whatever the plane says.
 #[test]
 fn past_its_limit_a_contact_is_open() {
     // The edge from the first corner to the second is the x axis, the surface ends towards -y.
