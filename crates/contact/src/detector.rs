@@ -5,12 +5,15 @@
 //! no search, are evaluated each frame. The solver takes the plain records and decides in each substep which of them
 //! act.
 //!
+//! What is near is known by parts: the pieces of all bodies. Two parts whose boxes are out of reach of each other do not
+//! matter to each other, however fast they part or pass, and a part that turns as a whole does not approach itself.
+//!
 //! The decision to search again depends on positions, velocities and frame time only, so results are the same for any
 //! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
 //! distance and face.
 //!
-//! Cost: an update without a search is a pass over the surface vertices, the candidates and the twins; a search is a
-//! refit of the tree and a query for each surface vertex, on all threads; a delta costs what the boundary lost and
+//! Cost: an update without a search is two passes over the surface vertices, and one over the candidates and the twins; a
+//! search is a refit of the trees and a query for each surface vertex and each feature edge, on all threads; a delta costs what the boundary lost and
 //! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
 //! cut builds a tree over the new triangles, and over all of them once these are more than a
 //! quarter.
@@ -21,10 +24,13 @@ use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
 use crate::ContactError;
+use crate::edges::{EdgeContact, FeatureEdges, turn};
+use crate::face::FaceContact;
 use crate::index::{NONE, index};
 use crate::normals::Shape;
 use crate::pairs::{FreshPairs, PairContact};
-use crate::query::{FaceContact, Found, Query};
+use crate::parts::Part;
+use crate::query::{Found, Query};
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};
@@ -37,6 +43,8 @@ const FRESH: usize = 4;
 const PARALLEL: usize = 512;
 /// A candidate whose vertex has moved along its triangle by this in barycentric coordinates is searched for again.
 const SLID: f64 = 0.5;
+/// It has to have moved by this fraction of the skin at least: on a sliver half a barycentric coordinate is nothing.
+const SLID_SKIN: f64 = 0.5;
 /// A vertex inside that has gone deeper by this fraction of the reach is searched for again, before it gets out of reach.
 const DEEPER: f64 = 0.25;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
@@ -51,6 +59,8 @@ pub struct ContactUpdate {
     pub pairs_changed: bool,
     /// Whether [`ContactDetector::faces`] has other particles than before.
     pub faces_changed: bool,
+    /// Whether [`ContactDetector::edges`] has other particles than before; normals change all the time.
+    pub edges_changed: bool,
 }
 
 /// A candidate beside its record: where it was found.
@@ -118,12 +128,18 @@ pub struct ContactDetector {
     pairs: Vec<PairContact>,
     faces: Vec<FaceContact>,
     sightings: Vec<Sighting>,
+    features: FeatureEdges,
+    /// Whether the surface has changed since they were listed.
+    features_are_due: bool,
+    edges: Vec<EdgeContact>,
     /// The vertices inside another part, ascending, each with the tet that contains it.
     inside: Vec<(ParticleId, TetId)>,
     deep: usize,
     buried: usize,
     /// The surface vertices, ascending.
     vertices: Vec<u32>,
+    /// The piece of each of them.
+    parts: Vec<u32>,
     /// Where they were at the last search.
     searched_at: Vec<DVec3>,
     /// How far the last search reached in m.
@@ -142,14 +158,16 @@ pub struct ContactDetector {
 struct Room {
     boxes: Vec<Box32>,
     normals: Vec<DVec3>,
+    areas: Vec<DVec3>,
     found: Vec<Found>,
     last_faces: Vec<FaceContact>,
+    last_edges: Vec<EdgeContact>,
     last_pairs: Vec<PairContact>,
     last_inside: Vec<(ParticleId, TetId)>,
-    /// By body the box around it.
-    bodies: Vec<Bounds>,
-    /// By body whether the box of another one that it may touch is near.
-    is_near: Vec<bool>,
+    /// By piece.
+    parts: Vec<Part>,
+    /// The pieces in the order of their boxes along x.
+    sorted: Vec<u32>,
     change: SurfaceChange,
 }
 
@@ -178,10 +196,14 @@ impl ContactDetector {
             pairs: Vec::new(),
             faces: Vec::new(),
             sightings: Vec::new(),
+            features: FeatureEdges::default(),
+            features_are_due: true,
+            edges: Vec::new(),
             inside: Vec::new(),
             deep: 0,
             buried: 0,
             vertices: Vec::new(),
+            parts: Vec::new(),
             searched_at: Vec::new(),
             reach: 0.0,
             search_is_due: true,
@@ -212,8 +234,8 @@ impl ContactDetector {
 
     /// Drops what refers to the surface of before.
     fn forget(&mut self) {
-        self.main.build(std::iter::empty(), &[]);
-        self.fresh.build(std::iter::empty(), &[]);
+        self.main.build(std::iter::empty(), &[], &[]);
+        self.fresh.build(std::iter::empty(), &[], &[]);
         self.main_slots = 0;
         self.fresh_is_due = true;
         self.search_is_due = true;
@@ -221,6 +243,9 @@ impl ContactDetector {
         self.inside.clear();
         self.faces.clear();
         self.sightings.clear();
+        self.features.clear();
+        self.features_are_due = true;
+        self.edges.clear();
         self.pairs.clear();
     }
 
@@ -270,6 +295,7 @@ impl ContactDetector {
             *tet = delta.slot_after(*tet);
         }
         self.fresh_is_due = true;
+        self.features_are_due = true;
         self.search_is_due = true;
     }
 
@@ -293,6 +319,7 @@ impl ContactDetector {
             particle.index() < delta.particles_before && tet.index() < delta.tets_before
         });
         self.fresh_is_due = true;
+        self.features_are_due = true;
         self.search_is_due = true;
     }
 
@@ -318,13 +345,11 @@ impl ContactDetector {
         assert_eq!(self.body_of.len(), particles, "all deltas were followed");
 
         if self.search_is_due {
-            self.vertices.clear();
-            self.vertices.extend(self.surface.vertices().map(|p| p.0));
+            self.list_vertices(state);
         }
-        let approach = self.approach(state);
-        let margin = approach.min(self.settings.reach * self.mean_edge);
+        let moved = self.survey(state);
         let skin = self.settings.skin * self.mean_edge;
-        let reach = skin + margin + self.settings.thickness;
+        let reach = skin + moved.margin + self.settings.thickness;
 
         std::mem::swap(&mut self.pairs, &mut self.room.last_pairs);
         let evaluated =
@@ -332,7 +357,8 @@ impl ContactDetector {
                 .evaluate(&self.surface, state.positions, reach, &mut self.pairs);
         let searched = self.search_is_due
             || evaluated.retired
-            || self.has_moved(state, approach)
+            || moved.needed > self.reach
+            || moved.needed.is_nan()
             || self.has_slid(state);
         let mut update = ContactUpdate {
             searched,
@@ -341,7 +367,15 @@ impl ContactDetector {
         if searched {
             self.reach = reach;
             self.search(state);
-            update.faces_changed = differ(&self.faces, &self.room.last_faces, |c| c.particles);
+            let Room {
+                last_faces,
+                last_edges,
+                ..
+            } = &self.room;
+            update.faces_changed = differ(&self.faces, last_faces, |c| c.particles);
+            update.edges_changed = differ(&self.edges, last_edges, |c| c.particles);
+        } else {
+            turn(&mut self.edges, state.positions);
         }
         update.pairs_changed = differ(&self.pairs, &self.room.last_pairs, |c| c.particles);
         update
@@ -364,26 +398,90 @@ impl ContactDetector {
         }
     }
 
-    /// A bound on how much closer any two surface points can come in the frame: no two velocities differ by more than
-    /// the diagonal of their box.
-    fn approach(&self, state: &ContactState<'_>) -> f64 {
-        let vertices = self.vertices.iter();
-        let velocities = vertices.map(|&p| state.velocities[p as usize]);
-        diagonal(&Bounds::around(velocities)) * state.frame_time
+    /// The surface vertices and their pieces.
+    fn list_vertices(&mut self, state: &ContactState<'_>) {
+        self.vertices.clear();
+        self.parts.clear();
+        for vertex in self.surface.vertices() {
+            let triangle = self.surface.fan(vertex).next();
+            self.vertices.push(vertex.0);
+            self.parts
+                .push(triangle.map_or(0, |triangle| state.pieces.piece_of(triangle.tet)));
+        }
+        self.searched_at.clear();
     }
 
-    /// Whether something may come into contact that the last search did not reach.
-    fn has_moved(&self, state: &ContactState<'_>, approach: f64) -> bool {
-        let vertices = self.vertices.iter().zip(&self.searched_at);
-        let moved = vertices.map(|(&p, before)| state.positions[p as usize] - *before);
-        let moved = diagonal(&Bounds::around(moved));
-        let needed = moved + approach + self.settings.thickness;
-        needed > self.reach || needed.is_nan()
+    /// Looks at all parts: how they have moved and may move towards those that they may touch and are near.
+    fn survey(&mut self, state: &ContactState<'_>) -> Moved {
+        let limit = self.settings.reach * self.mean_edge;
+        let thickness = self.settings.thickness;
+        let widest = (self.settings.skin * self.mean_edge + limit + thickness).max(self.reach);
+        let Room { parts, sorted, .. } = &mut self.room;
+        let number = self.parts.iter().map(|&part| part as usize);
+        let motions = self.vertices.iter().enumerate().map(|(i, &vertex)| {
+            let x = state.positions[vertex as usize];
+            // Where a search is due there is nothing to compare with.
+            let moved = self
+                .searched_at
+                .get(i)
+                .map_or(DVec3::ZERO, |before| x - *before);
+            (x, [moved, state.velocities[vertex as usize]])
+        });
+        parts.clear();
+        parts.resize(number.clone().max().map_or(0, |most| most + 1), Part::EMPTY);
+        for ((part, &vertex), (x, moves)) in number.clone().zip(&self.vertices).zip(motions.clone())
+        {
+            parts[part].body = self.body_of[vertex as usize];
+            parts[part].add(x, moves);
+        }
+        parts.iter_mut().for_each(Part::fit);
+        for (part, (x, moves)) in number.zip(motions) {
+            parts[part].leave(x, moves);
+        }
+        sorted.clear();
+        sorted.extend((0..index(parts.len())).filter(|&p| parts[p as usize].body != NONE));
+        let low = |p: &u32| parts[*p as usize].bounds.low.x;
+        sorted.sort_unstable_by(|p, q| low(p).total_cmp(&low(q)).then(p.cmp(q)));
+
+        let mut all = Moved::default();
+        let mut meet = |[moved, speed]: [f64; 2], turned: f64| {
+            let margin = (speed * state.frame_time).min(limit);
+            let needed = moved + margin + thickness + turned * (margin + thickness);
+            all.margin = all.margin.max(margin);
+            // What is no number asks for a search.
+            all.needed = if needed.is_nan() {
+                needed
+            } else {
+                all.needed.max(needed)
+            };
+        };
+        for i in 0..sorted.len() {
+            let one = parts[sorted[i] as usize];
+            if self.settings.self_contact {
+                meet(one.within(), one.turned());
+            }
+            let around = one.bounds.widened(widest);
+            for &second in &sorted[i + 1..] {
+                let other = &mut parts[second as usize];
+                if other.bounds.low.x > around.high.x {
+                    break;
+                }
+                let may_touch =
+                    one.body == other.body || self.settings.bodies.allow(one.body, other.body);
+                if may_touch && around.overlaps(&other.bounds) {
+                    meet(one.towards(other, widest), other.turned());
+                    other.is_near = true;
+                    parts[sorted[i] as usize].is_near = true;
+                }
+            }
+        }
+        all
     }
 
     /// Whether a vertex in contact is about to leave its triangle or has gone deeper.
     fn has_slid(&self, state: &ContactState<'_>) -> bool {
-        let close = 0.5 * self.settings.skin * self.mean_edge + self.settings.thickness;
+        let skin = self.settings.skin * self.mean_edge;
+        let close = 0.5 * skin + self.settings.thickness;
         let mut candidates = self.faces.iter().zip(&self.sightings);
         candidates.any(|(contact, sighting)| {
             let [_, second, third] = beneath(contact, state.positions);
@@ -402,7 +500,13 @@ impl ContactDetector {
                 || beyond(third, before3);
             let gap = contact.gap(state.positions);
             let is_deeper = gap < 0.0 && gap < sighting.gap - DEEPER * self.reach;
-            is_deeper || (has_slid || is_beyond) && gap < close
+            if is_deeper {
+                return true;
+            }
+            let [_, x1, x2, x3] = contact.particles.map(|p| state.positions[p as usize]);
+            let way = (x2 - x1) * slid[0] + (x3 - x1) * slid[1];
+            let has_moved = way.length() > SLID_SKIN * skin || !way.is_finite();
+            (has_slid || is_beyond) && has_moved && gap < close
         })
     }
 
@@ -410,7 +514,11 @@ impl ContactDetector {
     fn search(&mut self, state: &ContactState<'_>) {
         self.prepare_slots(state);
         self.sync_trees(state);
-        self.prepare_bodies(state.positions);
+        if self.features_are_due {
+            let rest = &state.mesh.mesh().positions;
+            self.features.list(&self.surface, rest);
+            self.features_are_due = false;
+        }
         self.query(state);
         self.collect(state);
         self.search_is_due = false;
@@ -418,19 +526,26 @@ impl ContactDetector {
 
     /// Boxes and normals of the triangles at the present positions.
     fn prepare_slots(&mut self, state: &ContactState<'_>) {
-        let Room { boxes, normals, .. } = &mut self.room;
+        let Room {
+            boxes,
+            normals,
+            areas,
+            ..
+        } = &mut self.room;
         let count = self.surface.slot_count();
         boxes.resize(count, Box32::EMPTY);
         normals.resize(count, DVec3::ZERO);
+        areas.resize(count, DVec3::ZERO);
         let surface = &self.surface;
-        let prepare = |(slot, (bounds, normal)): (usize, (&mut Box32, &mut DVec3))| {
-            (*bounds, *normal) = prepared(surface, state, index(slot));
+        type Slot<'a> = ((&'a mut Box32, &'a mut DVec3), &'a mut DVec3);
+        let prepare = |(slot, ((bounds, normal), area)): (usize, Slot<'_>)| {
+            (*bounds, *normal, *area) = prepared(surface, state, index(slot));
         };
         if count < 2 * PARALLEL {
-            let slots = boxes.iter_mut().zip(normals).enumerate();
+            let slots = boxes.iter_mut().zip(normals).zip(areas).enumerate();
             slots.for_each(prepare);
         } else {
-            let slots = boxes.par_iter_mut().zip(normals).enumerate();
+            let slots = boxes.par_iter_mut().zip(normals).zip(areas).enumerate();
             slots.with_min_len(PARALLEL).for_each(prepare);
         }
     }
@@ -443,61 +558,37 @@ impl ContactDetector {
             self.fresh_pairs.renumber(&self.surface, &numbers);
             self.mean_edge = self.surface.mean_edge(&state.mesh.mesh().positions);
             self.prepare_slots(state);
+            self.features_are_due = true;
             self.main_slots = self.surface.slot_count();
-            self.main.build(0..index(self.main_slots), &self.room.boxes);
-            self.fresh.build(std::iter::empty(), &[]);
+            let Room { boxes, normals, .. } = &self.room;
+            self.main.build(0..index(self.main_slots), boxes, normals);
+            self.fresh.build(std::iter::empty(), &[], &[]);
             self.fresh_is_due = false;
             return;
         }
-        self.main.refit(&self.room.boxes);
+        let Room { boxes, normals, .. } = &self.room;
+        self.main.refit(boxes, normals);
         if self.fresh_is_due {
             let new = index(self.main_slots)..index(slots);
             let alive = new.filter(|&slot| self.surface.is_alive(slot));
-            self.fresh.build(alive, &self.room.boxes);
+            self.fresh.build(alive, boxes, normals);
             self.fresh_is_due = false;
         } else {
-            self.fresh.refit(&self.room.boxes);
+            self.fresh.refit(boxes, normals);
         }
     }
 
-    /// Which bodies have another one near that they may touch.
-    fn prepare_bodies(&mut self, positions: &[DVec3]) {
-        let Room {
-            bodies, is_near, ..
-        } = &mut self.room;
-        bodies.clear();
-        for &vertex in &self.vertices {
-            let body = self.body_of[vertex as usize] as usize;
-            if bodies.len() <= body {
-                bodies.resize(body + 1, Bounds::EMPTY);
-            }
-            let point = Bounds::around([positions[vertex as usize]]);
-            bodies[body] = bodies[body].union(point);
-        }
-        is_near.clear();
-        is_near.resize(bodies.len(), false);
-        for one in 0..bodies.len() {
-            let around = bodies[one].widened(self.reach);
-            for other in one + 1..bodies.len() {
-                let allowed = self.settings.bodies.allow(index(one), index(other));
-                if allowed && around.overlaps(&bodies[other]) {
-                    (is_near[one], is_near[other]) = (true, true);
-                }
-            }
-        }
-    }
-
-    /// Searches for each vertex.
+    /// Searches for each vertex and each feature edge.
     fn query(&mut self, state: &ContactState<'_>) {
-        let bodies = self.room.bodies.iter();
-        let present = bodies.filter(|bounds| **bounds != Bounds::EMPTY).count();
         let Room {
             normals,
+            areas,
             found,
-            is_near,
+            parts,
+            last_edges,
             ..
         } = &mut self.room;
-        let normals = &*normals;
+        let (normals, areas) = (&*normals, &*areas);
         let query = Query {
             state,
             settings: &self.settings,
@@ -505,6 +596,7 @@ impl ContactDetector {
                 surface: &self.surface,
                 positions: state.positions,
                 normals,
+                areas,
             },
             trees: [&self.main, &self.fresh],
             pairs: &self.fresh_pairs,
@@ -512,16 +604,13 @@ impl ContactDetector {
             reach: self.reach,
             mean_edge: self.mean_edge,
         };
-        // A body touches itself, or its pieces each other, whichever bodies are near.
-        let touches_itself = self.settings.self_contact || state.pieces.count() > present;
-        let is_asked = |vertex: u32| {
-            let body = self.body_of[vertex as usize] as usize;
-            touches_itself || is_near[body]
-        };
+        let self_contact = self.settings.self_contact;
+        let is_asked = |part: u32| self_contact || parts[part as usize].is_near;
         if self.location_is_due {
             self.inside.clear();
-            let asked = self.vertices.iter().filter(|&&vertex| is_asked(vertex));
-            let mut asked = asked.map(|&vertex| ParticleId(vertex)).peekable();
+            let vertices = self.vertices.iter().zip(&self.parts);
+            let asked = vertices.filter(|&(_, &part)| is_asked(part));
+            let mut asked = asked.map(|(&vertex, _)| ParticleId(vertex)).peekable();
             if asked.peek().is_some() {
                 let tets = tree_of_tets(state);
                 let located = asked.filter_map(|p| Some((p, query.locate(p, &tets)?)));
@@ -530,22 +619,25 @@ impl ContactDetector {
             self.location_is_due = false;
         }
         let inside = &self.inside;
-        let ask = |(&vertex, found): (&u32, &mut Found)| {
-            *found = if is_asked(vertex) {
+        let ask = |((&vertex, &part), found): ((&u32, &u32), &mut Found)| {
+            if is_asked(part) {
                 let vertex = ParticleId(vertex);
                 let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
-                query.vertex(vertex, was_inside.ok().map(|i| inside[i].1))
+                query.vertex(vertex, was_inside.ok().map(|i| inside[i].1), found);
             } else {
-                Found::NOTHING
-            };
+                found.clear();
+            }
         };
         found.resize(self.vertices.len(), Found::NOTHING);
         if found.len() < PARALLEL {
-            self.vertices.iter().zip(found).for_each(ask);
+            let vertices = self.vertices.iter().zip(&self.parts);
+            vertices.zip(found).for_each(ask);
         } else {
-            let vertices = self.vertices.par_iter().zip(found);
+            let vertices = self.vertices.par_iter().zip(&self.parts).zip(found);
             vertices.with_min_len(PARALLEL / 4).for_each(ask);
         }
+        std::mem::swap(&mut self.edges, last_edges);
+        self.features.search(&query, &mut self.edges);
     }
 
     /// Makes lists of what was found for the vertices.
@@ -591,6 +683,19 @@ impl ContactDetector {
     #[must_use]
     pub fn faces(&self) -> &[FaceContact] {
         &self.faces
+    }
+
+    /// The candidates of feature edges, ascending by the ends of the first edge, then the second. Each two edges are there
+    /// once.
+    #[must_use]
+    pub fn edges(&self) -> &[EdgeContact] {
+        &self.edges
+    }
+
+    /// How many edges are sharp enough to be looked at, as of the last search.
+    #[must_use]
+    pub fn feature_edges(&self) -> usize {
+        self.features.count()
     }
 
     /// How many vertices lie inside another body or piece, beyond half of its thickness or without a triangle near
@@ -657,6 +762,14 @@ impl ContactDetector {
                 return Err(ContactError::Differs(what));
             }
         }
+        if !self.features_are_due {
+            let mut features = FeatureEdges::default();
+            features.list(&self.surface, &mesh.mesh().positions);
+            if !features.same(&self.features) {
+                let what = "the feature edges are others";
+                return Err(ContactError::Differs(what.to_owned()));
+            }
+        }
         let built = self.main_slots + self.fresh.len();
         if !self.fresh_is_due && self.main.len() + self.fresh.len() != built {
             return Err(ContactError::Differs("the trees miss triangles".to_owned()));
@@ -665,25 +778,38 @@ impl ContactDetector {
     }
 }
 
-/// The box and the unit normal of a triangle; the empty box and no normal if it must not be touched. The box is that of
-/// the tet behind it, so that the search also says which tets may contain a vertex.
-fn prepared(surface: &ContactSurface, state: &ContactState<'_>, slot: u32) -> (Box32, DVec3) {
-    const NOTHING: (Box32, DVec3) = (Box32::EMPTY, DVec3::ZERO);
+/// How parts that are near each other move, see [`ContactDetector::survey`].
+#[derive(Clone, Copy, Default)]
+struct Moved {
+    /// How much closer two of them may come in the frame in m, at most what the search looks ahead.
+    margin: f64,
+    /// How far a search must have reached in m to know of all that may come into contact in the frame.
+    needed: f64,
+}
+
+/// The box, the unit normal and the area vector of a triangle; the empty box and no normal if it must not be touched. The
+/// box is that of the tet behind it, so that the search also says which tets may contain a vertex.
+fn prepared(
+    surface: &ContactSurface,
+    state: &ContactState<'_>,
+    slot: u32,
+) -> (Box32, DVec3, DVec3) {
     if !surface.is_alive(slot) {
-        return NOTHING;
-    }
-    let tet = surface.triangle(slot).tet;
-    let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
-    if Barycentric::new(corners).is_none() {
-        return NOTHING;
+        return (Box32::EMPTY, DVec3::ZERO, DVec3::ZERO);
     }
     let area = surface.area(slot, state.positions);
+    let nothing = (Box32::EMPTY, DVec3::ZERO, area);
+    let tet = surface.triangle(slot).tet;
+    let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
+    if !Barycentric::exist(corners) {
+        return nothing;
+    }
     let squared = area.length_squared();
     if surface.is_collapsed(slot, squared) {
-        return NOTHING;
+        return nothing;
     }
     let bounds = Bounds::around(corners);
-    (Box32::around(&bounds), area / squared.sqrt())
+    (Box32::around(&bounds), area / squared.sqrt(), area)
 }
 
 /// A tree over all tets that are not flat or inverted, by their numbers. O(n log n).
@@ -691,14 +817,15 @@ fn tree_of_tets(state: &ContactState<'_>) -> TriangleTree {
     let tets = state.mesh.mesh().tets.iter();
     let boxes = tets.map(|corners| {
         let corners = corners.map(|p| state.positions[p.index()]);
-        match Barycentric::new(corners) {
-            Some(_) => Box32::around(&Bounds::around(corners)),
-            None => Box32::EMPTY,
+        if Barycentric::exist(corners) {
+            Box32::around(&Bounds::around(corners))
+        } else {
+            Box32::EMPTY
         }
     });
     let boxes: Vec<Box32> = boxes.collect();
     let mut tree = TriangleTree::default();
-    tree.build(0..index(boxes.len()), &boxes);
+    tree.build(0..index(boxes.len()), &boxes, &[]);
     tree
 }
 

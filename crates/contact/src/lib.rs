@@ -5,8 +5,9 @@
 //! - [`PairContact`]: two particles that were one before a cut. They start at a gap of exactly 0, need no search and
 //!   hold the sides of a cut apart from its first frame on ([`FreshPairs`]).
 //! - [`FaceContact`]: a vertex and a triangle, found by a search over the surface.
+//! - [`EdgeContact`]: two sharp edges that cross, found by the same search.
 //!
-//! Both are plain records of particle numbers and normals; a solver keeps `C ≥ 0` for each of them. A fresh cut has
+//! All are plain records of particle numbers and normals; a solver keeps `C ≥ 0` for each of them. A fresh cut has
 //! `C = 0` to the bit, so cutting a body without load changes nothing about its motion.
 //!
 //! ```
@@ -51,14 +52,18 @@
 //!
 //! # Limits
 //!
-//! Contacts are between vertices and triangles: sharp edges that cross between vertices are not noticed. A vertex that
-//! moves by more than half the thickness of a body in one substep may pass through it.
+//! Edges are noticed if they are rims of cuts or if their triangles turn by more than 40° at rest: a rounded edge of a
+//! coarse mesh, or a fold of a plate, may cross another edge between its vertices. A vertex that moves by more than half
+//! the thickness of a body in one substep may pass through it.
 
 mod detector;
+mod edges;
 mod error;
+mod face;
 mod index;
 mod normals;
 mod pairs;
+mod parts;
 mod query;
 mod settings;
 mod state;
@@ -67,9 +72,10 @@ mod tree;
 mod walk;
 
 pub use detector::{ContactDetector, ContactUpdate};
+pub use edges::EdgeContact;
 pub use error::ContactError;
+pub use face::{FaceContact, FaceLimit};
 pub use pairs::{FreshPairs, PairContact};
-pub use query::FaceContact;
 pub use settings::{BodyPairs, ContactSettings};
 pub use state::ContactState;
 pub use surface::ContactSurface;

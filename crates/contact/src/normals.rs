@@ -19,6 +19,8 @@ pub(crate) struct Shape<'a> {
     /// By slot the unit normal; zero for an empty slot and for a triangle that must not be touched, because it has
     /// collapsed or its tet is inverted.
     pub(crate) normals: &'a [DVec3],
+    /// By slot the area vector, see [`ContactSurface::area`]; of use where there is a triangle.
+    pub(crate) areas: &'a [DVec3],
 }
 
 impl<'a> Shape<'a> {
@@ -88,20 +90,6 @@ impl<'a> Shape<'a> {
         // Faces folded onto each other have no common outside.
         sum.normalize_or(face)
     }
-
-    /// The coefficients of a vector in a sound triangle's basis `x₂ − x₁`, `x₃ − x₁` and their cross product, in which
-    /// it turns and stretches with the triangle.
-    pub(crate) fn in_basis(&self, slot: u32, normal: DVec3) -> [f64; 3] {
-        let [x1, x2, x3] = self.corners(slot);
-        let (e1, e2) = (x2 - x1, x3 - x1);
-        let across = e1.cross(e2);
-        let squared = across.length_squared();
-        [
-            normal.dot(e2.cross(across)) / squared,
-            normal.dot(across.cross(e1)) / squared,
-            normal.dot(across) / squared,
-        ]
-    }
 }
 
 #[cfg(test)]
@@ -125,6 +113,7 @@ mod tests {
             surface: &surface,
             positions,
             normals: &normals,
+            areas: &[],
         };
         let particle = |x: DVec3| ParticleId::new(positions.iter().position(|p| *p == x).unwrap());
         let top = particle(DVec3::ONE);
@@ -146,27 +135,5 @@ mod tests {
             assert!(normal.distance(DVec3::new(1.0, 1.0, 0.0).normalize()) < 1e-15);
         }
         assert_eq!(sides, 2);
-    }
-
-    /// The basis takes a vector along when the body turns.
-    #[test]
-    fn a_normal_turns_with_its_triangle() {
-        let body = CuttableMesh::new(kuhn_box([1; 3], DVec3::ONE)).unwrap();
-        let positions = &body.mesh().positions;
-        let surface = ContactSurface::new(&body);
-        let shape = Shape {
-            surface: &surface,
-            positions,
-            normals: &[],
-        };
-        let vector = DVec3::new(0.2, -0.5, 0.7);
-        let turn = |x: DVec3| DVec3::new(x.y, -x.x, x.z);
-        for slot in 0..12 {
-            let [a, b, c] = shape.in_basis(slot, vector);
-            let [x1, x2, x3] = shape.corners(slot).map(turn);
-            let (e1, e2) = (x2 - x1, x3 - x1);
-            let turned = e1 * a + e2 * b + e1.cross(e2) * c;
-            assert!(turned.distance(turn(vector)) < 1e-15);
-        }
     }
 }

@@ -8,19 +8,20 @@
 //! 4. the closest point of the triangle is within reach and is a local minimum of the distance to the surface: on an
 //!    edge or a vertex no triangle around it is closer. So a flat or convex surface is touched once and a concave corner
 //!    by each of its walls. One triangle stands for all those around the edge or the vertex: the one that faces most;
-//! 5. outside, one of the nearest three. Inside, the nearest whose depth is less than half of the thickness there and
-//!    from which a way through tets leads to the vertex without meeting one of the vertex's own tets.
+//! 5. outside, one of the nearest three. Inside, the nearest from which a way through tets leads to the vertex without
+//!    meeting one of the vertex's own tets, if its depth is less than half of the thickness there.
 //!
 //! A vertex inside a tet of a body that no such triangle explains is deep: from that tet the neighbors are searched for a
-//! way out, up to 64 tets. If there is none, the vertex is buried.
+//! way out, nearest first, up to 64 tets. If there is none, the vertex is buried.
 //!
 //! Sources: J. A. Bærentzen and H. Aanæs 2005 (sides); H. Chen, E. Diaz, C. Yuksel 2023 (valid ways). Cost: a search in
 //! the tree, and for each triangle found a few dozen operations.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use incise_cutting::FaceTag;
 use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest_on_triangle};
 
+use crate::face::{FaceContact, Meeting, face_contact};
 use crate::index::NONE;
 use crate::normals::Shape;
 use crate::pairs::FreshPairs;
@@ -31,6 +32,8 @@ use crate::walk::{Barycentric, walk};
 
 /// Sides face each other where the dot product of their unit normals is below this.
 const FACING: f64 = 0.2;
+/// The limit for dot products in single precision beyond which it is passed in double precision, too.
+const FACING_SINGLE: f32 = 0.2 + 1e-5;
 /// Distances that differ by this, in mean edges, are the same.
 const SAME: f64 = 1e-9;
 /// Up to this distance in mean edges a vertex counts as touching an edge or a vertex.
@@ -46,47 +49,6 @@ const TRIES: usize = 8;
 const FAR: f64 = 2.0;
 /// Tets that are looked at for a way out of a body.
 const DEEP_TETS: usize = 64;
-
-/// A contact of a vertex with a triangle: `n · (x₀ − Σ βᵢ xᵢ) ≥ 0` with weights `β` of a point of the triangle.
-///
-/// The weights are those of the present positions, not of the search. Where the normal is the triangle's own, they are
-/// those of the vertex's projection, at most a quarter beyond the triangle: on a flat surface the contact then stays
-/// while the vertex slides on to the next triangle. Otherwise the vertex is about to touch an edge or a corner, and they
-/// are those of the closest point of the triangle ([`incise_mesh::closest_on_triangle`]).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct FaceContact {
-    /// The vertex, then the corners of the triangle, counterclockwise seen from outside.
-    pub particles: [u32; 4],
-    /// The normal `n` in the triangle's own basis: `n = unit(a e₁ + b e₂ + c (e₁ × e₂))` with `e₁ = x₂ − x₁` and
-    /// `e₂ = x₃ − x₁`, so that it turns with the triangle. `[0, 0, 1]` is that of the triangle itself.
-    pub normal: [f64; 3],
-}
-
-impl FaceContact {
-    /// The normal at the positions given, of unit length; zero if the triangle has collapsed.
-    ///
-    /// # Panics
-    /// If a particle has no position.
-    #[must_use]
-    pub fn normal_at(&self, positions: &[DVec3]) -> DVec3 {
-        let [_, x1, x2, x3] = self.particles.map(|p| positions[p as usize]);
-        let (e1, e2) = (x2 - x1, x3 - x1);
-        let [a, b, c] = self.normal;
-        (e1 * a + e2 * b + e1.cross(e2) * c).normalize_or_zero()
-    }
-
-    /// The distance of the vertex to the closest point of the triangle along the normal in m, negative inside.
-    ///
-    /// # Panics
-    /// If a particle has no position.
-    #[must_use]
-    pub fn gap(&self, positions: &[DVec3]) -> f64 {
-        let [x, x1, x2, x3] = self.particles.map(|p| positions[p as usize]);
-        let closest = closest_on_triangle([x1, x2, x3], x).point;
-        self.normal_at(positions).dot(x - closest)
-    }
-}
 
 /// What was found for a vertex.
 #[derive(Clone, Copy, Debug)]
@@ -105,7 +67,8 @@ impl Found {
     pub(crate) const NOTHING: Self = Self {
         contacts: [FaceContact {
             particles: [0; 4],
-            normal: [0.0; 3],
+            beyond: None,
+            limit: None,
         }; OUTSIDE + 1],
         count: 0,
         inside: NONE,
@@ -113,13 +76,31 @@ impl Found {
         is_buried: false,
     };
 
+    pub(crate) fn clear(&mut self) {
+        self.count = 0;
+        self.inside = NONE;
+        self.is_deep = false;
+        self.is_buried = false;
+    }
+
     pub(crate) fn contacts(&self) -> &[FaceContact] {
         &self.contacts[..self.count]
     }
 
-    fn push(&mut self, contact: FaceContact) {
-        self.contacts[self.count] = contact;
-        self.count += 1;
+    /// Keeps a contact, unless there is one with its triangle: a folded surface may be found from both sides, and two
+    /// triangles may stand for the one between them.
+    fn push(&mut self, contact: Option<FaceContact>) {
+        let Some(contact) = contact else { return };
+        let corners = |contact: &FaceContact| {
+            let [_, corners @ ..] = contact.particles;
+            corners
+        };
+        let [a, b, c] = corners(&contact);
+        let is_known = |known: &FaceContact| corners(known).iter().all(|p| [a, b, c].contains(p));
+        if !self.contacts().iter().any(is_known) {
+            self.contacts[self.count] = contact;
+            self.count += 1;
+        }
     }
 }
 
@@ -132,7 +113,9 @@ struct Near {
     slot: u32,
     point: DVec3,
     part: TrianglePart,
-    normal: DVec3,
+    is_inside: bool,
+    /// The direction from the closest point to the vertex of a triangle that is on an edge or a corner of it.
+    apart: Option<DVec3>,
 }
 
 impl Near {
@@ -170,6 +153,7 @@ impl<const N: usize> Nearest<N> {
 /// The outward normals of a vertex, one for each tag around it.
 struct VertexNormals {
     normals: [(FaceTag, DVec3); Self::MOST],
+    single: [Vec3; Self::MOST],
     count: usize,
 }
 
@@ -180,6 +164,7 @@ impl VertexNormals {
     fn new(shape: &Shape<'_>, vertex: ParticleId) -> Self {
         let mut this = Self {
             normals: [(FaceTag::Outer, DVec3::ZERO); Self::MOST],
+            single: [Vec3::ZERO; Self::MOST],
             count: 0,
         };
         for (slot, _) in shape.surface.corners(vertex) {
@@ -190,10 +175,12 @@ impl VertexNormals {
                 this.normals[this.count - 1].0 = tag;
                 this.count - 1
             });
-            this.normals[place].1 += shape.surface.area(slot, shape.positions);
+            this.normals[place].1 += shape.areas[slot as usize];
         }
-        for (_, normal) in &mut this.normals[..this.count] {
+        for k in 0..this.count {
+            let normal = &mut this.normals[k].1;
             *normal = normal.normalize_or_zero();
+            this.single[k] = normal.as_vec3();
         }
         this
     }
@@ -205,6 +192,22 @@ impl VertexNormals {
             .map(|(_, normal)| *normal)
             .sum::<DVec3>()
             .normalize_or_zero()
+    }
+
+    /// Whether a triangle does not face the vertex for sure, whatever rounding does; cheap.
+    #[inline]
+    fn turn_away(&self, normal: Vec3) -> bool {
+        let mut normals = self.single[..self.count].iter();
+        self.count > 0 && normals.all(|n| n.dot(normal) >= FACING_SINGLE)
+    }
+
+    /// Whether no triangle faces the vertex whose normal is in a box.
+    #[inline]
+    fn all_turn_away(&self, normals: &Box32) -> bool {
+        let (low, high) = (Vec3::from(normals.low), Vec3::from(normals.high));
+        let mut own = self.single[..self.count].iter();
+        // The least dot product with a vector of the box.
+        self.count > 0 && own.all(|&n| (n * low).min(n * high).element_sum() >= FACING_SINGLE)
     }
 
     /// The least dot product with a normal: how little a triangle faces the vertex. A vertex without a normal, whose
@@ -255,8 +258,8 @@ impl Query<'_> {
         let vertex = self.vertex_of(id, &normals)?;
         let wanted = Box32::around(&Bounds::around([vertex.behind]));
         let mut containing: Option<TetId> = None;
-        tets.search(&wanted, |tet, _| {
-            let tet = TetId(tet);
+        tets.search(&wanted, |leaf| {
+            let tet = TetId(leaf.number);
             if self.may_touch_part(&vertex, tet) && self.is_inside(tet, &vertex) {
                 containing = Some(containing.map_or(tet, |other| other.min(tet)));
             }
@@ -278,12 +281,12 @@ impl Query<'_> {
         })
     }
 
-    /// What `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
-    pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>) -> Found {
-        let mut found = Found::NOTHING;
+    /// Writes what `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
+    pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>, found: &mut Found) {
+        found.clear();
         let normals = VertexNormals::new(&self.shape, id);
         let Some(vertex) = self.vertex_of(id, &normals) else {
-            return found;
+            return;
         };
         let x = vertex.x;
         let mut outside = Nearest::<OUTSIDE>::EMPTY;
@@ -292,18 +295,28 @@ impl Query<'_> {
         let around = Bounds::around([x]).widened(self.reach);
         let wanted = Box32::around(&around);
         for tree in self.trees {
-            tree.search(&wanted, |slot, bounds| {
-                if !self.shape.is_sound(slot) || !self.may_touch(&vertex, slot) {
+            // What is unsound has an empty box.
+            let is_wanted = |bounds: &Box32, around: &Box32| {
+                !normals.all_turn_away(around) || bounds.contains(vertex.behind)
+            };
+            tree.search_where(&wanted, is_wanted, |leaf| {
+                let slot = leaf.number;
+                let contains = leaf.bounds.contains(vertex.behind);
+                let turns_away = normals.turn_away(leaf.normal);
+                if (turns_away && !contains) || !self.may_touch(&vertex, slot) {
                     return;
                 }
-                if bounds.contains(vertex.behind) {
+                if contains {
                     let tet = self.shape.triangle(slot).tet;
                     if self.is_inside(tet, &vertex) {
                         containing = containing.min(tet.0);
                     }
                 }
-                if let Some((near, is_inside)) = self.near(&vertex, slot) {
-                    if is_inside {
+                if turns_away {
+                    return;
+                }
+                if let Some(near) = self.near(&vertex, slot) {
+                    if near.is_inside {
                         inside.insert(near);
                     } else {
                         outside.insert(near);
@@ -314,14 +327,13 @@ impl Query<'_> {
         for near in outside.iter() {
             found.push(self.contact(&vertex, near));
         }
-        let valid = inside.iter().find_map(|near| {
-            let way = self.way(near, &vertex)?;
-            self.is_shallow(near, x).then_some((near, way))
-        });
-        if let Some((near, tet)) = valid {
+        let mut ways = inside.iter();
+        let nearest = ways.find_map(|near| Some((near, self.way(near, &vertex)?)));
+        let shallow = nearest.filter(|(near, _)| self.is_shallow(near, x));
+        if let Some((near, tet)) = shallow {
             found.push(self.contact(&vertex, near));
             found.inside = tet.0;
-            return found;
+            return;
         }
         if let Some(tet) = was_inside.and_then(|tet| self.followed(tet, &vertex)) {
             containing = tet.0;
@@ -330,18 +342,10 @@ impl Query<'_> {
             found.inside = containing;
             found.is_deep = true;
             match self.way_out(TetId(containing), &vertex) {
-                Some(near) => {
-                    let contact = self.contact(&vertex, &near);
-                    // A folded surface may have been found from outside, too.
-                    let same = |known: &FaceContact| known.particles == contact.particles;
-                    if !found.contacts().iter().any(same) {
-                        found.push(contact);
-                    }
-                }
+                Some(near) => found.push(self.contact(&vertex, &near)),
                 None => found.is_buried = true,
             }
         }
-        found
     }
 
     /// Whether the vertex may touch a triangle: it is no corner of it and their bodies may touch.
@@ -360,8 +364,20 @@ impl Query<'_> {
         }
     }
 
-    /// The triangle of a slot if the vertex may be about to touch it or has passed it, and whether it has.
-    fn near(&self, vertex: &Vertex<'_>, slot: u32) -> Option<(Near, bool)> {
+    /// Whether the parts of two tets may touch.
+    pub(crate) fn may_touch_each_other(&self, tets: [TetId; 2]) -> bool {
+        let corners = |tet: TetId| self.state.mesh.mesh().tets[tet.index()];
+        let [one, other] = tets.map(|tet| self.body_of[corners(tet)[0].index()]);
+        if one == other {
+            let [one, other] = tets.map(|tet| self.state.pieces.piece_of(tet));
+            self.settings.self_contact || one != other
+        } else {
+            self.settings.bodies.allow(one, other)
+        }
+    }
+
+    /// The triangle of a slot if the vertex may be about to touch it or has passed it.
+    fn near(&self, vertex: &Vertex<'_>, slot: u32) -> Option<Near> {
         let face = self.shape.normal(slot);
         let facing = vertex.normals.facing(face);
         if facing >= FACING && facing.is_finite() {
@@ -395,44 +411,52 @@ impl Query<'_> {
         if self.pairs.partners(vertex.id).any(has_partner) {
             return None;
         }
-        let side = self.shape.side_normal(slot, part).dot(x - point);
-        let is_inside = side < 0.0;
-        // Along the way to the closest point. It has no direction where the two touch, and there the triangle's own
-        // normal serves: at the rim of a box, a sum over all faces would push aside what stands on it.
-        let normal = if part == TrianglePart::Face || distance <= TOUCHING * self.mean_edge {
-            face
-        } else if is_inside {
-            (point - x) / distance
-        } else {
-            (x - point) / distance
-        };
-        let near = Near {
+        let is_inside = self.shape.side_normal(slot, part).dot(x - point) < 0.0;
+        // The direction between the two; there is none where they touch.
+        let is_apart = part != TrianglePart::Face && distance > TOUCHING * self.mean_edge;
+        Some(Near {
             distance,
             key,
             slot,
             point,
             part,
-            normal,
-        };
-        Some((near, is_inside))
+            is_inside,
+            apart: is_apart.then(|| (x - point) / distance),
+        })
     }
 
-    fn contact(&self, vertex: &Vertex<'_>, near: &Near) -> FaceContact {
-        let [a, b, c] = self.shape.triangle(near.slot).particles.map(|p| p.0);
-        FaceContact {
-            particles: [vertex.id.0, a, b, c],
-            normal: if near.normal == self.shape.normal(near.slot) {
-                [0.0, 0.0, 1.0]
-            } else {
-                self.shape.in_basis(near.slot, near.normal)
-            },
-        }
+    /// `None` if a live pair holds the vertex there.
+    fn contact(&self, vertex: &Vertex<'_>, near: &Near) -> Option<FaceContact> {
+        let meeting = Meeting {
+            vertex: vertex.id,
+            slot: near.slot,
+            part: near.part,
+            // Inside, that direction leads through the surface.
+            apart: near.apart.filter(|_| !near.is_inside),
+            is_inside: near.is_inside,
+            touching: TOUCHING * self.mean_edge,
+            reach: self.reach,
+        };
+        let (contact, slot) = face_contact(&self.shape, &meeting);
+        // From the outer surface it may come to be one with the cut face that the vertex was parted from.
+        let tag = self.shape.triangle(slot).tag;
+        let is_of_pair = |partner| {
+            self.shape
+                .surface
+                .fan(partner)
+                .any(|other| other.tag == tag)
+        };
+        let is_held = slot != near.slot && self.pairs.partners(vertex.id).any(is_of_pair);
+        (!is_held).then_some(contact)
     }
 
     /// Whether the depth is less than half of the thickness there: a point as deep again is still inside.
     fn is_shallow(&self, near: &Near, x: DVec3) -> bool {
-        let depth = near.normal.dot(near.point - x);
-        let twice = near.point - near.normal * (2.0 * depth);
+        let normal = near
+            .apart
+            .map_or(self.shape.normal(near.slot), |apart| -apart);
+        let depth = normal.dot(near.point - x);
+        let twice = near.point - normal * (2.0 * depth);
         self.ways(near, twice).next().is_some()
     }
 
@@ -450,7 +474,7 @@ impl Query<'_> {
         starts.filter_map(move |(slot, _)| self.walk(self.shape.triangle(slot).tet, segment))
     }
 
-    fn walk(&self, tet: TetId, segment: [DVec3; 2]) -> Option<TetId> {
+    pub(crate) fn walk(&self, tet: TetId, segment: [DVec3; 2]) -> Option<TetId> {
         walk(self.state.mesh, self.state.positions, tet, segment)
     }
 
@@ -495,53 +519,69 @@ impl Query<'_> {
 
     /// The nearest triangle of the boundary around the tet that contains the vertex from which a way leads to it: among
     /// those that face it, unless another one is much nearer or none does.
+    ///
+    /// Tets are looked at in the order of the distances of the faces that they are entered by, so that a way through many
+    /// thin tets is found before one through a few large ones.
     fn way_out(&self, tet: TetId, vertex: &Vertex<'_>) -> Option<Near> {
-        let mut seen = [TetId(0); DEEP_TETS];
-        seen[0] = tet;
-        let (mut known, mut done) = (1, 0);
-        let mut facing = Nearest::<TRIES>::EMPTY;
-        let mut others = Nearest::<TRIES>::EMPTY;
-        while done < known {
-            let tet = seen[done];
-            done += 1;
+        // The tets known, with the distance where they are entered and whether they were looked at.
+        let mut known = [(0.0, tet, false); 3 * DEEP_TETS + 2];
+        let mut count = 1;
+        let [mut facing, mut other] = [None::<Near>; 2];
+        for _ in 0..DEEP_TETS {
+            let due = known[..count].iter_mut().filter(|known| !known.2);
+            let order = |one: &(f64, TetId, bool), other: &(f64, TetId, bool)| {
+                one.0.total_cmp(&other.0).then(one.1.cmp(&other.1))
+            };
+            let Some(next) = due.min_by(|one, other| order(one, other)) else {
+                break;
+            };
+            let (entered, tet, done) = next;
+            // A way that faces the vertex is kept if it is the nearest of those.
+            if facing.is_some_and(|near| near.distance <= *entered) {
+                break;
+            }
+            *done = true;
+            let (entered, tet) = (*entered, *tet);
             for (opposite, neighbor) in (0..).zip(self.state.mesh.neighbors(tet)) {
-                match neighbor {
-                    Some(neighbor) if known < DEEP_TETS => {
-                        if !seen[..known].contains(&neighbor) {
-                            seen[known] = neighbor;
-                            known += 1;
+                let Some(neighbor) = neighbor else {
+                    let slot = self.shape.surface.slot_of(tet, opposite);
+                    let may_touch =
+                        |slot: &u32| self.shape.is_sound(*slot) && self.may_touch(vertex, *slot);
+                    if let Some(slot) = slot.filter(may_touch) {
+                        let (near, faces) = self.deep(vertex, slot);
+                        let best = if faces { &mut facing } else { &mut other };
+                        let is_nearer = best.is_none_or(|best| near.precedes(&best));
+                        if is_nearer && self.way(&near, vertex).is_some() {
+                            *best = Some(near);
                         }
                     }
-                    Some(_) => {}
-                    None => {
-                        let slot = self.shape.surface.slot_of(tet, opposite);
-                        let slot = slot.filter(|&slot| {
-                            self.shape.is_sound(slot) && self.may_touch(vertex, slot)
-                        });
-                        if let Some((near, faces)) = slot.map(|slot| self.deep(vertex, slot)) {
-                            if faces {
-                                facing.insert(near);
-                            } else {
-                                others.insert(near);
-                            }
-                        }
-                    }
+                    continue;
+                };
+                if known[..count]
+                    .iter()
+                    .all(|(_, known, _)| *known != neighbor)
+                {
+                    let closest = closest_on_triangle(self.face_corners(tet, opposite), vertex.x);
+                    let distance = closest.point.distance(vertex.x).max(entered);
+                    known[count] = (distance, neighbor, false);
+                    count += 1;
                 }
             }
         }
-        let first = |list: &Nearest<TRIES>| {
-            let mut ways = list.iter().filter(|near| self.way(near, vertex).is_some());
-            ways.next().copied()
-        };
-        match (first(&facing), first(&others)) {
+        match (facing, other) {
             (Some(near), Some(other)) if near.distance > FAR * other.distance => Some(other),
             (near, other) => near.or(other),
         }
     }
 
+    /// The corners of a tet but one.
+    fn face_corners(&self, tet: TetId, opposite: u8) -> [DVec3; 3] {
+        let corners = self.tet_corners(tet);
+        [1, 2, 3].map(|k| corners[(usize::from(opposite) + k) % 4])
+    }
+
     /// A triangle that a deep vertex might leave by, and whether it faces it.
     fn deep(&self, vertex: &Vertex<'_>, slot: u32) -> (Near, bool) {
-        let normal = self.shape.normal(slot);
         let ClosestPoint { point, part, .. } =
             closest_on_triangle(self.shape.corners(slot), vertex.x);
         let near = Near {
@@ -550,9 +590,10 @@ impl Query<'_> {
             slot,
             point,
             part,
-            normal,
+            is_inside: true,
+            apart: None,
         };
-        let facing = vertex.normals.facing(normal);
+        let facing = vertex.normals.facing(self.shape.normal(slot));
         (near, facing < FACING || !facing.is_finite())
     }
 }

@@ -2,11 +2,13 @@
 //!
 //! Built by halving at the median center along the longest axis, four triangles a leaf, nodes in the order of a walk
 //! with the node to skip to. A search needs no stack. Boxes are in single precision, rounded outward, so that half the
-//! memory is read and nothing is missed. Its results are a set: their order is the tree's own.
+//! memory is read and nothing is missed. Its results are a set: their order is the tree's own. What most searches look at
+//! of a triangle, its box and its normal, lies beside those of the others of its leaf. A node also has a box around the
+//! normals below it, so that a search may leave out whole patches that face the wrong way.
 //!
 //! Cost: O(n log n) to build, O(n) to refit, O(log n + found) a search.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use incise_mesh::Bounds;
 
 use crate::index::index;
@@ -89,6 +91,8 @@ fn rounded_up(x: f64) -> f32 {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Node {
     bounds: Box32,
+    /// Around the normals below it.
+    normals: Box32,
     /// The node after all those below it.
     next: u32,
     /// Of a leaf, the place of its first triangle.
@@ -97,29 +101,54 @@ struct Node {
     count: u32,
 }
 
+/// A triangle in a tree.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Leaf {
+    pub(crate) bounds: Box32,
+    /// Of unit length up to single precision.
+    pub(crate) normal: Vec3,
+    pub(crate) number: u32,
+}
+
 /// A tree over numbered triangles.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct TriangleTree {
     nodes: Vec<Node>,
+    leaves: Vec<Leaf>,
+    /// The numbers in the order of the leaves.
     order: Vec<u32>,
-    /// In the order of `order`.
-    boxes: Vec<Box32>,
 }
 
 impl TriangleTree {
-    /// Builds it over the triangles whose numbers are given, in the memory it has. `boxes` are by number.
-    pub(crate) fn build(&mut self, numbers: impl Iterator<Item = u32>, boxes: &[Box32]) {
+    /// Builds it over the triangles whose numbers are given, in the memory it has. Boxes and normals are by number; what
+    /// has no normals has none at all.
+    pub(crate) fn build(
+        &mut self,
+        numbers: impl Iterator<Item = u32>,
+        boxes: &[Box32],
+        normals: &[DVec3],
+    ) {
         self.order.clear();
         self.order.extend(numbers);
         self.nodes.clear();
         if !self.order.is_empty() {
             self.split(0, self.order.len(), boxes);
         }
-        self.boxes.clear();
-        let places = self.order.iter();
-        self.boxes
-            .extend(places.map(|&number| boxes[number as usize]));
+        self.refit(boxes, normals);
+    }
+
+    fn fill(&mut self, boxes: &[Box32], normals: &[DVec3]) {
+        self.leaves.clear();
+        let leaves = self.order.iter().map(|&number| Leaf {
+            bounds: boxes[number as usize],
+            normal: normals
+                .get(number as usize)
+                .map_or(Vec3::ZERO, |normal| normal.as_vec3()),
+            number,
+        });
+        self.leaves.extend(leaves);
     }
 
     fn split(&mut self, first: usize, end: usize, boxes: &[Box32]) {
@@ -132,6 +161,7 @@ impl TriangleTree {
         let node = self.nodes.len();
         self.nodes.push(Node {
             bounds,
+            normals: Box32::EMPTY,
             next: 0,
             first: index(first),
             count: if is_leaf { index(items.len()) } else { 0 },
@@ -150,21 +180,29 @@ impl TriangleTree {
         self.nodes[node].next = index(self.nodes.len());
     }
 
-    /// Takes over the present boxes, those of removed triangles empty.
-    pub(crate) fn refit(&mut self, boxes: &[Box32]) {
-        for (place, &number) in self.order.iter().enumerate() {
-            self.boxes[place] = boxes[number as usize];
-        }
+    /// Takes over the present boxes and normals, the boxes of removed triangles empty.
+    pub(crate) fn refit(&mut self, boxes: &[Box32], normals: &[DVec3]) {
+        self.fill(boxes, normals);
         for i in (0..self.nodes.len()).rev() {
             let node = self.nodes[i];
-            self.nodes[i].bounds = if node.count > 0 {
+            let around = if node.count > 0 {
                 let triangles = node.first as usize..(node.first + node.count) as usize;
-                let boxes = self.boxes[triangles].iter();
-                boxes.fold(Box32::EMPTY, |all, one| all.union(*one))
+                let leaves = self.leaves[triangles].iter();
+                leaves.fold([Box32::EMPTY; 2], |[bounds, normals], leaf| {
+                    let normal = leaf.normal.to_array();
+                    let normal = Box32 {
+                        low: normal,
+                        high: normal,
+                    };
+                    [bounds.union(leaf.bounds), normals.union(normal)]
+                })
             } else {
                 let left = &self.nodes[i + 1];
-                left.bounds.union(self.nodes[left.next as usize].bounds)
+                let right = &self.nodes[left.next as usize];
+                let bounds = left.bounds.union(right.bounds);
+                [bounds, left.normals.union(right.normals)]
             };
+            [self.nodes[i].bounds, self.nodes[i].normals] = around;
         }
     }
 
@@ -173,19 +211,31 @@ impl TriangleTree {
         self.order.len()
     }
 
-    /// Calls `visit` with the number and the box of each triangle whose box overlaps `wanted`.
+    /// Calls `visit` with each triangle whose box overlaps `wanted`.
     #[inline]
-    pub(crate) fn search(&self, wanted: &Box32, mut visit: impl FnMut(u32, &Box32)) {
+    pub(crate) fn search(&self, wanted: &Box32, visit: impl FnMut(&Leaf)) {
+        self.search_where(wanted, |_, _| true, visit);
+    }
+
+    /// Calls `visit` with each triangle whose box overlaps `wanted`, but for those below a node that is refused by the box
+    /// around it and the box around the normals below it.
+    #[inline]
+    pub(crate) fn search_where(
+        &self,
+        wanted: &Box32,
+        is_wanted: impl Fn(&Box32, &Box32) -> bool,
+        mut visit: impl FnMut(&Leaf),
+    ) {
         let mut here = 0;
         while let Some(node) = self.nodes.get(here) {
-            if !node.bounds.overlaps(wanted) {
+            if !node.bounds.overlaps(wanted) || !is_wanted(&node.bounds, &node.normals) {
                 here = node.next as usize;
                 continue;
             }
             let triangles = node.first as usize..(node.first + node.count) as usize;
-            for place in triangles {
-                if self.boxes[place].overlaps(wanted) {
-                    visit(self.order[place], &self.boxes[place]);
+            for leaf in &self.leaves[triangles] {
+                if leaf.bounds.overlaps(wanted) {
+                    visit(leaf);
                 }
             }
             here += 1;
@@ -210,7 +260,7 @@ mod tests {
 
     fn found(tree: &TriangleTree, wanted: &Box32) -> Vec<u32> {
         let mut found = Vec::new();
-        tree.search(wanted, |number, _| found.push(number));
+        tree.search(wanted, |leaf| found.push(leaf.number));
         found.sort_unstable();
         found
     }
@@ -221,7 +271,7 @@ mod tests {
         let mut tree = TriangleTree::default();
         for count in [0_usize, 1, 4, 5, 9, 200] {
             let mut now = boxes(count, 0, 4.0);
-            tree.build(0..index(count), &now);
+            tree.build(0..index(count), &now, &[]);
             for round in 0..3 {
                 for wanted in boxes(50, 1234, 8.0) {
                     let expected: Vec<u32> = (0..index(count))
@@ -233,9 +283,40 @@ mod tests {
                 for empty in now.iter_mut().step_by(3) {
                     *empty = Box32::EMPTY;
                 }
-                tree.refit(&now);
+                tree.refit(&now, &[]);
             }
         }
+    }
+
+    /// A condition on normals leaves out nothing that meets it.
+    #[test]
+    fn finds_what_faces() {
+        let count = 200;
+        let now = boxes(count, 5, 4.0);
+        let normals: Vec<DVec3> = (0..count)
+            .map(|i| {
+                DVec3::new(((i * 31) % 17) as f64 - 8.0, ((i * 7) % 5) as f64, 1.0).normalize()
+            })
+            .collect();
+        let mut tree = TriangleTree::default();
+        tree.build(0..index(count), &now, &normals);
+        let mut left_out = 0;
+        for wanted in boxes(50, 99, 8.0) {
+            let mut found = Vec::new();
+            let faces = |normal: f32| normal < -0.5;
+            tree.search_where(
+                &wanted,
+                |_, normals| faces(normals.low[0]),
+                |leaf| found.push((leaf.number, leaf.normal.x)),
+            );
+            let all = (0..index(count)).filter(|&i| now[i as usize].overlaps(&wanted));
+            left_out += all.clone().count() - found.len();
+            let mut found: Vec<u32> = found.iter().filter(|f| faces(f.1)).map(|f| f.0).collect();
+            found.sort_unstable();
+            let expected = all.filter(|&i| faces(normals[i as usize].as_vec3().x));
+            assert!(expected.eq(found));
+        }
+        assert!(left_out > 100);
     }
 
     #[test]

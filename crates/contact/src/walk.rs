@@ -38,6 +38,13 @@ impl Barycentric {
         })
     }
 
+    /// Whether a tet has coordinates.
+    #[inline]
+    pub(crate) fn exist([a, b, c, d]: [DVec3; 4]) -> bool {
+        let volume = (b - a).dot((c - a).cross(d - a));
+        volume > 0.0 && (1.0 / volume).is_finite()
+    }
+
     #[inline]
     pub(crate) fn of(&self, x: DVec3) -> [f64; 4] {
         let [b, c, d] = self.rows.map(|row| row.dot(x - self.origin));
@@ -148,9 +155,10 @@ mod tests {
     #[test]
     fn a_flat_tet_ends_the_way() {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(0.3, 0.3, 0.0)];
-        assert!(Barycentric::new(corners).is_none());
+        assert!(Barycentric::new(corners).is_none() && !Barycentric::exist(corners));
         let [a, b, c, d] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
         assert!(Barycentric::new([a, c, b, d]).is_none());
+        assert!(!Barycentric::exist([a, c, b, d]) && Barycentric::exist([a, b, c, d]));
         let barycentric = Barycentric::new([a, b, c, d]).unwrap();
         assert_eq!(
             barycentric.of(DVec3::new(0.25, 0.5, 0.125)),

@@ -1,4 +1,4 @@
-// Contacts: pairs of particles across a fresh cut, and vertices against triangles. A thread solves a contact; those of a
+// Contacts: pairs of particles across a fresh cut, vertices against triangles, and edges against edges. A thread solves a contact; those of a
 // dispatch, or of a step of a tail, share no particle. Twin: `contacts.rs` of incise-xpbd, which explains the equations;
 // the order of operations is equal.
 
@@ -7,6 +7,8 @@ override KEEPS: bool = false;
 
 // In place of a particle that a contact does not have.
 const NONE: u32 = 0xffffffffu;
+// The sine of the angle between two edges up to which they count as parallel, squared.
+const PARALLEL_SQUARED: f32 = 0.0001;
 
 struct ContactUniform {
     friction: f32,
@@ -21,26 +23,45 @@ struct ContactUniform {
 @group(0) @binding(1) var<uniform> dispatch_range: DispatchRange;
 @group(0) @binding(2) var<storage, read_write> particles: array<vec4<f32>>;
 @group(0) @binding(3) var<storage, read> previous: array<vec4<f32>>;
-// Contact -> the vertex and the corners of its triangle, or both particles of a pair and twice NONE; NONE first in an
-// empty place.
+// Contact -> the vertex and the corners of its triangle, the ends of two edges, or both particles of a pair and twice NONE;
+// NONE first in an empty place.
 @group(0) @binding(4) var<storage, read> corners: array<vec4<u32>>;
-// Contact -> the second plane in the basis of the triangle and the thickness, or the normal of a pair.
+// Contact -> two vectors: the second plane in the basis of the triangle and the thickness, or the normal of a pair; the
+// limit in that basis and its distance. Of two edges the normal and the thickness, and a distance below 0.
 @group(0) @binding(5) var<storage, read> numbers: array<vec4<f32>>;
 @group(0) @binding(6) var<uniform> law: ContactUniform;
 // Contact -> the sums of a frame of the impulse and of its normal part.
 @group(0) @binding(7) var<storage, read_write> impulses: array<vec4<f32>>;
-// Contact -> the impulse of friction and the multiplier of the substep.
+// Contact -> the impulse of friction and the multiplier of the substep, negative on the second plane.
 @group(0) @binding(8) var<storage, read_write> multipliers: array<vec4<f32>>;
 // The groups of 64 contacts of the colors.
 @group(0) @binding(9) var<storage, read> lists: array<u32>;
 
-// A contact at the present positions. The gradient at each particle is the normal times its share.
-struct Gap {
+// A plane of a contact at the present positions. The gradient at each particle is the normal times its share.
+struct Plane {
     normal: vec3<f32>,
-    residual: f32,
     shares: vec4<f32>,
-    // False where a triangle has no normal.
+    is_second: bool,
+    // False where a triangle has no normal, or a contact no second plane.
     exists: bool,
+}
+
+// A contact at the present positions.
+struct Gap {
+    plane: Plane,
+    residual: f32,
+    // Whether the vertex is past the end of the surface, so that there is no contact whatever the residual says.
+    is_past: bool,
+}
+
+// The particles of a contact, those that it does not have zero, and the numbers that describe it.
+struct Contact {
+    now: array<vec4<f32>, 4>,
+    old: array<vec3<f32>, 4>,
+    // False for a pair.
+    has_four: bool,
+    beyond: vec4<f32>,
+    limit: vec4<f32>,
 }
 
 // Both edges from the first corner of a triangle, and the vertex from there.
@@ -58,13 +79,23 @@ fn new_part(value: f32, before: f32) -> f32 {
     return value;
 }
 
-fn pair_gap(normal: vec3<f32>, between: vec3<f32>, before: vec3<f32>) -> Gap {
-    let residual = new_part(dot(normal, between), dot(normal, before));
-    return Gap(normal, residual, vec4(-settings.one, settings.one, 0.0, 0.0), true);
+fn no_plane() -> Plane {
+    return Plane(vec3(0.0), vec4(0.0), false, false);
 }
 
-fn above(at: Basis, normal: vec3<f32>, second: f32, third: f32, thickness: f32) -> f32 {
-    return dot(normal, at.r - at.e1 * second - at.e2 * third) - thickness;
+fn basis_now(contact: Contact) -> Basis {
+    let b = contact.now[1].xyz;
+    return Basis(contact.now[2].xyz - b, contact.now[3].xyz - b, contact.now[0].xyz - b);
+}
+
+fn basis_old(contact: Contact) -> Basis {
+    let b = contact.old[1];
+    return Basis(contact.old[2] - b, contact.old[3] - b, contact.old[0] - b);
+}
+
+fn above(at: Basis, plane: Plane, thickness: f32) -> f32 {
+    let foot = at.r + at.e1 * plane.shares.z + at.e2 * plane.shares.w;
+    return dot(plane.normal, foot) - thickness;
 }
 
 // The weight of a corner from the side of the grown triangle, 0 beyond it.
@@ -75,18 +106,17 @@ fn from_side(weight: f32) -> f32 {
     return 0.0;
 }
 
-fn face_gap(now: Basis, old: Basis, plane: vec4<f32>) -> Gap {
-    let none = Gap(vec3(0.0), 0.0, vec4(0.0), false);
-    let area = cross(now.e1, now.e2);
-    let face = direction(area);
+// The plane of the triangle.
+fn own_plane(at: Basis) -> Plane {
+    let face = direction(cross(at.e1, at.e2));
     if !(face.w > 0.0) {
-        return none;
+        return no_plane();
     }
-    var second = dot(cross(now.r, now.e2), face.xyz) / face.w;
-    var third = dot(cross(now.e1, now.r), face.xyz) / face.w;
+    var second = dot(cross(at.r, at.e2), face.xyz) / face.w;
+    var third = dot(cross(at.e1, at.r), face.xyz) / face.w;
     let first = settings.one - second - third;
     if !(is_finite(first) && is_finite(second) && is_finite(third)) {
-        return none;
+        return no_plane();
     }
     let margin = law.margin;
     if !(first >= -margin && second >= -margin && third >= -margin) {
@@ -97,36 +127,175 @@ fn face_gap(now: Basis, old: Basis, plane: vec4<f32>) -> Gap {
         second = b * scale - margin;
         third = c * scale - margin;
     }
-    let value = above(now, face.xyz, second, third, plane.w);
-    let residual = new_part(value, above(old, face.xyz, second, third, plane.w));
-    let own = Gap(
-        face.xyz,
-        residual,
-        vec4(settings.one, second + third - settings.one, -second, -third),
-        true,
-    );
-    if residual >= 0.0 || all(plane.xyz == vec3(0.0)) {
-        return own;
+    let shares = vec4(settings.one, second + third - settings.one, -second, -third);
+    return Plane(face.xyz, shares, false, true);
+}
+
+// A direction from its coefficients in the basis of the triangle.
+fn combined(at: Basis, coefficients: vec3<f32>) -> vec4<f32> {
+    let area = cross(at.e1, at.e2);
+    return direction(at.e1 * coefficients.x + at.e2 * coefficients.y + area * coefficients.z);
+}
+
+// Where the vertex is along the edge from the first corner to the second; `along` is the direction and the length of it.
+fn part_of_edge(at: Basis, along: vec4<f32>, low: f32, high: f32) -> f32 {
+    var part = dot(at.r, along.xyz) / along.w;
+    if part < low {
+        part = low;
     }
-    let other = direction(now.e1 * plane.x + now.e2 * plane.y + area * plane.z);
-    let edge = direction(now.e1);
-    if !(other.w > 0.0 && edge.w > 0.0) {
-        return own;
-    }
-    var part = dot(now.r, edge.xyz) / edge.w;
-    if part < -margin {
-        part = -margin;
-    }
-    let high = settings.one + margin;
     if part > high {
         part = high;
     }
-    let height = above(now, other.xyz, part, 0.0, plane.w);
-    let beyond = new_part(height, above(old, other.xyz, part, 0.0, plane.w));
-    if beyond > residual {
-        return Gap(other.xyz, beyond, vec4(settings.one, part - settings.one, -part, 0.0), true);
+    return part;
+}
+
+// The plane beyond the edge from the first corner to the second.
+fn plane_beyond(at: Basis, beyond: vec3<f32>) -> Plane {
+    if all(beyond == vec3(0.0)) {
+        return no_plane();
     }
-    return own;
+    let other = combined(at, beyond);
+    let edge = direction(at.e1);
+    if !(other.w > 0.0 && edge.w > 0.0) {
+        return no_plane();
+    }
+    let part = part_of_edge(at, edge, -law.margin, settings.one + law.margin);
+    let shares = vec4(settings.one, part - settings.one, -part, 0.0);
+    return Plane(other.xyz, shares, true, true);
+}
+
+// Whether the vertex is past the end of the surface.
+fn is_past(at: Basis, limit: vec4<f32>, thickness: f32) -> bool {
+    if all(limit.xyz == vec3(0.0)) {
+        return false;
+    }
+    let outward = combined(at, limit.xyz);
+    let edge = direction(at.e1);
+    if !(outward.w > 0.0 && edge.w > 0.0) {
+        return false;
+    }
+    let part = part_of_edge(at, edge, 0.0, settings.one);
+    return dot(outward.xyz, at.r - at.e1 * part) > limit.w + thickness;
+}
+
+fn face_gap(contact: Contact) -> Gap {
+    let now = basis_now(contact);
+    let old = basis_old(contact);
+    let thickness = contact.beyond.w;
+    let own = own_plane(now);
+    if !own.exists {
+        return Gap(own, 0.0, false);
+    }
+    let value = above(now, own, thickness);
+    var gap = Gap(own, new_part(value, above(old, own, thickness)), false);
+    if gap.residual >= 0.0 {
+        return gap;
+    }
+    let beyond = plane_beyond(now, contact.beyond.xyz);
+    if beyond.exists {
+        let height = above(now, beyond, thickness);
+        let residual = new_part(height, above(old, beyond, thickness));
+        if residual > gap.residual {
+            gap = Gap(beyond, residual, false);
+        }
+    }
+    gap.is_past = !(gap.residual >= 0.0) && is_past(now, contact.limit, thickness);
+    return gap;
+}
+
+// The gap between two edges through their closest points.
+fn edge_gap(contact: Contact) -> Gap {
+    let none = Gap(no_plane(), 0.0, false);
+    let along = direction(contact.now[1].xyz - contact.now[0].xyz);
+    let other = direction(contact.now[3].xyz - contact.now[2].xyz);
+    if !(along.w > 0.0 && other.w > 0.0) {
+        return none;
+    }
+    let across = cross(along.xyz, other.xyz);
+    let square = dot(across, across);
+    if !(square > PARALLEL_SQUARED) {
+        return none;
+    }
+    let r = contact.now[0].xyz - contact.now[2].xyz;
+    var first = -(dot(r, cross(other.xyz, across)) / square) / along.w;
+    var second = -(dot(r, cross(along.xyz, across)) / square) / other.w;
+    if !(is_finite(first) && is_finite(second)) {
+        return none;
+    }
+    let one = settings.one;
+    let is_past = !(first >= 0.0 && first <= one && second >= 0.0 && second <= one);
+    first = max(first, 0.0);
+    first = min(first, one);
+    second = max(second, 0.0);
+    second = min(second, one);
+    let shares = vec4(one - first, first, second - one, -second);
+    let plane = Plane(contact.beyond.xyz, shares, false, true);
+    let now = (contact.now[0].xyz - contact.now[2].xyz)
+        + (contact.now[1].xyz - contact.now[0].xyz) * shares.y
+        + (contact.now[3].xyz - contact.now[2].xyz) * shares.w;
+    let old = (contact.old[0] - contact.old[2])
+        + (contact.old[1] - contact.old[0]) * shares.y
+        + (contact.old[3] - contact.old[2]) * shares.w;
+    let value = dot(plane.normal, now) - contact.beyond.w;
+    let before = dot(plane.normal, old) - contact.beyond.w;
+    return Gap(plane, new_part(value, before), is_past);
+}
+
+fn pair_plane(contact: Contact) -> Plane {
+    let shares = vec4(-settings.one, settings.one, 0.0, 0.0);
+    return Plane(contact.beyond.xyz, shares, false, true);
+}
+
+fn gap_of(contact: Contact) -> Gap {
+    if contact.has_four {
+        if contact.limit.w < 0.0 {
+            return edge_gap(contact);
+        }
+        return face_gap(contact);
+    }
+    let plane = pair_plane(contact);
+    let value = dot(plane.normal, contact.now[1].xyz - contact.now[0].xyz);
+    let before = dot(plane.normal, contact.old[1] - contact.old[0]);
+    return Gap(plane, new_part(value, before), false);
+}
+
+// The first or the second plane.
+fn plane_of(contact: Contact, is_second: bool) -> Plane {
+    if !contact.has_four {
+        return pair_plane(contact);
+    }
+    if contact.limit.w < 0.0 {
+        return edge_gap(contact).plane;
+    }
+    let now = basis_now(contact);
+    if is_second {
+        return plane_beyond(now, contact.beyond.xyz);
+    }
+    return own_plane(now);
+}
+
+// Whether there is no contact at present.
+fn is_open(gap: Gap) -> bool {
+    return gap.is_past || gap.residual >= 0.0;
+}
+
+// The contact after an impulse along a plane.
+fn pushed(contact: Contact, shares: vec4<f32>, impulse: vec3<f32>) -> Contact {
+    var moved = contact;
+    for (var k = 0; k < 4; k++) {
+        let x = contact.now[k];
+        moved.now[k] = vec4(x.xyz + impulse * (x.w * shares[k]), x.w);
+    }
+    return moved;
+}
+
+fn store_contact(corner: vec4<u32>, contact: Contact) {
+    particles[corner.x] = contact.now[0];
+    particles[corner.y] = contact.now[1];
+    if contact.has_four {
+        particles[corner.z] = contact.now[2];
+        particles[corner.w] = contact.now[3];
+    }
 }
 
 fn solve_contact(index: u32) {
@@ -134,45 +303,60 @@ fn solve_contact(index: u32) {
     if corner.x == NONE {
         return;
     }
-    let is_face = corner.z != NONE;
-    let a = particles[corner.x];
-    let b = particles[corner.y];
-    let old_a = previous[corner.x].xyz;
-    let old_b = previous[corner.y].xyz;
-    var c = vec4(0.0);
-    var d = vec4(0.0);
-    var old_c = vec3(0.0);
-    var old_d = vec3(0.0);
-    let plane = numbers[index];
-    var gap: Gap;
-    if is_face {
-        c = particles[corner.z];
-        d = particles[corner.w];
-        old_c = previous[corner.z].xyz;
-        old_d = previous[corner.w].xyz;
-        let now = Basis(c.xyz - b.xyz, d.xyz - b.xyz, a.xyz - b.xyz);
-        let old = Basis(old_c - old_b, old_d - old_b, old_a - old_b);
-        gap = face_gap(now, old, plane);
-    } else {
-        gap = pair_gap(plane.xyz, b.xyz - a.xyz, old_b - old_a);
+    let has_four = corner.z != NONE;
+    var contact: Contact;
+    contact.has_four = has_four;
+    contact.now[0] = particles[corner.x];
+    contact.now[1] = particles[corner.y];
+    contact.old[0] = previous[corner.x].xyz;
+    contact.old[1] = previous[corner.y].xyz;
+    contact.beyond = numbers[2u * index];
+    if has_four {
+        contact.now[2] = particles[corner.z];
+        contact.now[3] = particles[corner.w];
+        contact.old[2] = previous[corner.z].xyz;
+        contact.old[3] = previous[corner.w].xyz;
+        contact.limit = numbers[2u * index + 1u];
     }
-    if !gap.exists || !is_finite(gap.residual) {
+    var gap = gap_of(contact);
+    if !gap.plane.exists || !is_finite(gap.residual) {
         return;
     }
     var multiplier = vec4(0.0);
     if KEEPS {
         multiplier = multipliers[index];
     }
-    let before = multiplier.w;
-    // Apart, and not to be let go of either.
-    if !(gap.residual < 0.0 || before > 0.0) {
+    var before = abs(multiplier.w);
+    var friction = multiplier.xyz;
+    // Open, and no impulse to take back.
+    if is_open(gap) && !(before > 0.0) {
         return;
     }
-    let shares = gap.shares;
-    let sum = a.w * shares.x * shares.x
-        + b.w * shares.y * shares.y
-        + c.w * shares.z * shares.z
-        + d.w * shares.w * shares.w;
+    let was_second = multiplier.w < 0.0;
+    if before > 0.0 && (gap.is_past || gap.plane.is_second != was_second) {
+        // What pressed along another plane, or on a surface that has ended, is taken back where it acted.
+        let plane = plane_of(contact, was_second);
+        let impulse = -(plane.normal * before + friction);
+        if !plane.exists || !are_finite(impulse) {
+            return;
+        }
+        contact = pushed(contact, plane.shares, impulse);
+        store_contact(corner, contact);
+        impulses[index] += vec4(impulse, -before);
+        before = 0.0;
+        friction = vec3(0.0);
+        multipliers[index] = vec4(0.0);
+        gap = gap_of(contact);
+        if !gap.plane.exists || !is_finite(gap.residual) || is_open(gap) {
+            return;
+        }
+    }
+    let plane = gap.plane;
+    let shares = plane.shares;
+    let sum = contact.now[0].w * shares.x * shares.x
+        + contact.now[1].w * shares.y * shares.y
+        + contact.now[2].w * shares.z * shares.z
+        + contact.now[3].w * shares.w * shares.w;
     // Nothing that could move it.
     if !(sum > 0.0) {
         return;
@@ -185,14 +369,15 @@ fn solve_contact(index: u32) {
         return;
     }
     let pressure = before + change;
-    var impulse = gap.normal * change;
-    var friction = multiplier.xyz;
+    var impulse = plane.normal * change;
     if law.friction > 0.0 {
-        var slide = (a.xyz - old_a) * shares.x + (b.xyz - old_b) * shares.y;
-        if is_face {
-            slide = slide + (c.xyz - old_c) * shares.z + (d.xyz - old_d) * shares.w;
+        var slide = (contact.now[0].xyz - contact.old[0]) * shares.x
+            + (contact.now[1].xyz - contact.old[1]) * shares.y;
+        if has_four {
+            slide = slide + (contact.now[2].xyz - contact.old[2]) * shares.z
+                + (contact.now[3].xyz - contact.old[3]) * shares.w;
         }
-        slide = slide - gap.normal * dot(gap.normal, slide);
+        slide = slide - plane.normal * dot(plane.normal, slide);
         var wanted = friction - slide * (settings.one / sum);
         let length = sqrt(dot(wanted, wanted));
         let limit = law.friction * pressure;
@@ -205,14 +390,9 @@ fn solve_contact(index: u32) {
     if !are_finite(impulse) {
         return;
     }
-    particles[corner.x] = vec4(a.xyz + impulse * (a.w * shares.x), a.w);
-    particles[corner.y] = vec4(b.xyz + impulse * (b.w * shares.y), b.w);
-    if is_face {
-        particles[corner.z] = vec4(c.xyz + impulse * (c.w * shares.z), c.w);
-        particles[corner.w] = vec4(d.xyz + impulse * (d.w * shares.w), d.w);
-    }
+    store_contact(corner, pushed(contact, shares, impulse));
     if KEEPS {
-        multipliers[index] = vec4(friction, pressure);
+        multipliers[index] = vec4(friction, select(pressure, -pressure, plane.is_second));
     }
     impulses[index] += vec4(impulse, change);
 }

@@ -1,8 +1,8 @@
 //! [`Contacts`]: what of an island touches, found between its substeps and handed to its solver.
 //!
 //! A detector (`incise-contact`) follows the cuts of the island's mesh and lists what may touch in the frame to come:
-//! pairs of particles across fresh cuts, and vertices near triangles. The lists are colored when their particles
-//! change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
+//! pairs of particles across fresh cuts, vertices near triangles, and sharp edges near each other. The lists are colored
+//! when their particles change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
 //! surfaces approach each other by more than the search looks ahead, the frame is divided and contacts are found again.
 //! What pressed is summed up by pairs of pieces after the frame, for forces and for the events of contacts that begin
 //! and end.
@@ -16,11 +16,11 @@ use std::time::Instant;
 
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
-use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState, ContactSurface};
+use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
 use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
 use incise_graph::{Coloring, Incidence};
 use incise_mesh::{ParticleId, closest_on_triangle};
-use incise_xpbd::{ContactLaw, FaceContact, PairContact};
+use incise_xpbd::{ContactLaw, EdgeContact, FaceContact, FaceLimit, PairContact, SurfaceContact};
 
 use crate::backend::{AnySolver, each, each_mut};
 use crate::report::{ContactCounts, milliseconds};
@@ -40,18 +40,6 @@ const DEEP: f64 = 0.1;
 /// For how long it has to: s, and recovery times, within which an overlap of the start has parted.
 const DEEP_TIME: f64 = 0.25;
 const RECOVERIES: f64 = 5.0;
-/// The sine of the angle between two triangles from which the edge between them counts as convex.
-const FLAT: f64 = 1e-3;
-/// The cosine between the normals of two triangles below which they face each other, and that above which they do not.
-const FACES: f64 = -0.3;
-const FACES_NOT: f64 = -0.1;
-/// A place in the list of contacts.
-const NO_CONTACT: FaceContact = FaceContact {
-    particles: [0; 4],
-    beyond: None,
-    thickness: 0.0,
-};
-
 /// The pairs of bodies that contact joins into islands, if all that the scene says about it is in its range.
 pub(crate) fn pairs(scene: &Scene, bodies: usize) -> Result<Vec<[usize; 2]>, Error> {
     let Some(contact) = &scene.contact else {
@@ -147,9 +135,9 @@ pub(crate) struct Contacts {
     law: ContactLaw,
     thickness: f64,
     pair_colors: Coloring,
-    face_colors: Coloring,
-    /// The contacts of vertices as the solver takes them, from the last search.
-    faces: Vec<FaceContact>,
+    surface_colors: Coloring,
+    /// The contacts of vertices and those of edges as the solver takes them, from the last search.
+    surfaces: Vec<SurfaceContact>,
     /// Ascending by pieces.
     touches: Vec<Touch>,
     /// For how long in s a contact has been deep at the end of each frame.
@@ -222,8 +210,8 @@ impl Contacts {
             law: law(spec),
             thickness: spec.thickness,
             pair_colors: Coloring::default(),
-            face_colors: Coloring::default(),
-            faces: Vec::new(),
+            surface_colors: Coloring::default(),
+            surfaces: Vec::new(),
             touches: Vec::new(),
             deep_time: 0.0,
             before: Vec::new(),
@@ -320,42 +308,28 @@ impl Contacts {
             frame_time: time,
         });
         let particles = self.room.positions.len();
-        let (pairs, faces) = (self.detector.pairs(), self.detector.faces());
+        let pairs = self.detector.pairs();
         if update.pairs_changed || pairs.len() != self.pair_colors.vertex_count() {
             let all = pairs.iter().map(|contact| contact.particles);
             self.pair_colors = colors(particles, all)?;
         }
-        if update.searched || faces.len() != self.faces.len() {
-            let (bodies, rest) = (self.detector.body_of(), &mesh.mesh().positions);
-            let thickness = |particles: [u32; 4]| {
-                let [vertex, corner, ..] = particles.map(|p| bodies[p as usize]);
-                if self.thickness > 0.0 && vertex == corner {
-                    let [x, a, b, c] = particles.map(|p| rest[p as usize]);
-                    self.thickness
-                        .min(x.distance(closest_on_triangle([a, b, c], x).point))
-                } else {
-                    self.thickness
-                }
-            };
-            let (surface, positions) = (self.detector.surface(), &self.room.positions);
-            let reach = self.detector.reach();
-            let mut changed = faces.len() != self.face_colors.vertex_count();
-            self.faces.resize(faces.len(), NO_CONTACT);
-            for (contact, out) in faces.iter().zip(&mut self.faces) {
-                let (particles, beyond) = planes(surface, positions, contact.particles, reach);
-                changed |= particles != out.particles;
-                *out = FaceContact {
-                    particles,
-                    beyond,
-                    thickness: thickness(particles),
-                };
+        let (faces, edges) = (self.detector.faces().len(), self.detector.edges().len());
+        if update.searched || faces + edges != self.surfaces.len() {
+            self.list_surfaces(&mesh.mesh().positions);
+            let lists = update.faces_changed || update.edges_changed;
+            if lists || self.surfaces.len() != self.surface_colors.vertex_count() {
+                let all = self.surfaces.iter().map(SurfaceContact::particles);
+                self.surface_colors = colors(particles, all)?;
             }
-            if changed {
-                let all = self.faces.iter().map(|contact| contact.particles);
-                self.face_colors = colors(particles, all)?;
+        } else {
+            let edges = self.detector.edges().iter();
+            for (contact, known) in edges.zip(&mut self.surfaces[faces..]) {
+                if let SurfaceContact::Edges(known) = known {
+                    known.normal = contact.normal;
+                }
             }
         }
-        let room = &mut self.room;
+        let (room, pairs) = (&mut self.room, self.detector.pairs());
         room.pairs.clear();
         room.pairs.extend(pairs.iter().map(|contact| PairContact {
             particles: contact.particles,
@@ -363,12 +337,52 @@ impl Contacts {
         }));
         each_mut!(solver, solver => {
             let pairs = (&room.pairs[..], &self.pair_colors);
-            let faces = (&self.faces[..], &self.face_colors);
-            let set = solver.set_contacts(&self.law, pairs, faces);
+            let surfaces = (&self.surfaces[..], &self.surface_colors);
+            let set = solver.set_contacts(&self.law, pairs, surfaces);
             set.map_err(|source| Error::Xpbd { field: "contact".into(), source })?;
         });
         self.milliseconds += milliseconds(start.elapsed());
         Ok(())
+    }
+
+    /// Takes over the contacts between surfaces from the detector. Between surfaces of one body, a thickness is at most
+    /// their distance at rest.
+    fn list_surfaces(&mut self, rest: &[DVec3]) {
+        let bodies = self.detector.body_of();
+        let thickness = |[one, other]: [u32; 2], distance: &dyn Fn() -> f64| {
+            if self.thickness > 0.0 && bodies[one as usize] == bodies[other as usize] {
+                self.thickness.min(distance())
+            } else {
+                self.thickness
+            }
+        };
+        self.surfaces.clear();
+        self.surfaces
+            .extend(self.detector.faces().iter().map(|contact| {
+                let [vertex, corner, ..] = contact.particles;
+                let distance = || {
+                    let [x, a, b, c] = contact.particles.map(|p| rest[p as usize]);
+                    x.distance(closest_on_triangle([a, b, c], x).point)
+                };
+                SurfaceContact::Face(FaceContact {
+                    particles: contact.particles,
+                    beyond: contact.beyond,
+                    limit: contact.limit.map(|limit| FaceLimit {
+                        normal: limit.normal,
+                        distance: limit.distance,
+                    }),
+                    thickness: thickness([vertex, corner], &distance),
+                })
+            }));
+        self.surfaces
+            .extend(self.detector.edges().iter().map(|contact| {
+                let [end, _, other, _] = contact.particles;
+                SurfaceContact::Edges(EdgeContact {
+                    particles: contact.particles,
+                    normal: contact.normal,
+                    thickness: thickness([end, other], &|| contact.distance(rest)),
+                })
+            }));
     }
 
     /// Notes what pressed in the part of the frame that has ended.
@@ -403,8 +417,7 @@ impl Contacts {
                     continue;
                 }
                 let force = if vertex > against { contact.force } else { -contact.force };
-                let point = solver.position(contact.vertex as usize);
-                out.push(Touch { pieces: key, force, torque: point.cross(force) });
+                out.push(Touch { pieces: key, force, torque: contact.point.cross(force) });
             }
         });
     }
@@ -474,8 +487,8 @@ impl Contacts {
         self.room.touches.clear();
         self.deep_time = 0.0;
         self.end_frame();
-        (self.pair_colors, self.face_colors) = (Coloring::default(), Coloring::default());
-        self.faces.clear();
+        (self.pair_colors, self.surface_colors) = (Coloring::default(), Coloring::default());
+        self.surfaces.clear();
         let none = Coloring::default();
         each_mut!(solver, solver => {
             let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
@@ -525,8 +538,9 @@ impl Contacts {
         let triangles = self.detector.surface().triangle_count();
         particles * PARTICLE
             + triangles * TRIANGLE
-            + size_of_val(&*self.faces)
+            + size_of_val(&*self.surfaces)
             + size_of_val(self.detector.faces())
+            + size_of_val(self.detector.edges())
             + size_of_val(self.detector.pairs())
     }
 
@@ -543,82 +557,4 @@ fn colors<const K: usize>(
 ) -> Result<Coloring, Error> {
     let incidence = Incidence::from_constraints(particles, contacts)?;
     Ok(greedy(&incidence, Order::Natural))
-}
-
-/// A vertex and a triangle, turned so that the edge nearest to the vertex runs from the first corner to the second, and,
-/// if that edge is convex, the normal of the surface beyond it in the basis of the triangle.
-///
-/// Of the two surfaces, one that no triangle around the vertex faces cannot be what it meets, if the other one is faced:
-/// at the rim of a cut the vertices of one side meet the cut face of the other side and not its outer surface. Then the
-/// contact is with the other surface alone.
-fn planes(
-    surface: &ContactSurface,
-    positions: &[DVec3],
-    contact: [u32; 4],
-    reach: f64,
-) -> ([u32; 4], Option<[f64; 3]>) {
-    let at = |p: u32| positions[p as usize];
-    let [vertex, corners @ ..] = contact;
-    let [a, b, c] = corners.map(at);
-    let area = (b - a).cross(c - a);
-    // Of the edge opposite to each corner: the area of the triangle that it makes with the foot of the vertex.
-    let weight = |k: usize| {
-        let [from, to] = [1, 2].map(|step| at(corners[(k + step) % 3]));
-        (to - from).cross(at(vertex) - from).dot(area)
-    };
-    let weights = [0, 1, 2].map(weight);
-    let least = |least: usize, k: usize| {
-        if weights[k] < weights[least] {
-            k
-        } else {
-            least
-        }
-    };
-    let opposite = (1..3).fold(0, least);
-    let [p, q, r] = [1, 2, 3].map(|step| corners[(opposite + step) % 3]);
-    let turned = [vertex, p, q, r];
-    let mut others = surface.fan(ParticleId(p)).filter_map(|triangle| {
-        let numbers = triangle.particles.map(|p| p.0);
-        // Neighbors run along a common edge in opposite directions.
-        let k = (0..3).find(|&k| numbers[k] == q && numbers[(k + 1) % 3] == p)?;
-        Some(numbers[(k + 2) % 3])
-    });
-    let Some(other) = others.next() else {
-        return (turned, None);
-    };
-    let (x, e1, e2) = (at(p), at(q) - at(p), at(r) - at(p));
-    let way = at(other) - x;
-    // Convex: the other triangle bends away from the plane of this one.
-    let is_convex = area.dot(way) < -FLAT * area.length() * way.length();
-    let normals = [area.try_normalize(), way.cross(e1).try_normalize()];
-    let [Some(own), Some(normal)] = normals else {
-        return (turned, None);
-    };
-    if !is_convex {
-        return (turned, None);
-    }
-    let around = surface.fan(ParticleId(vertex)).filter_map(|triangle| {
-        let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
-        (b - a).cross(c - a).try_normalize()
-    });
-    let (mut to_own, mut to_other) = (1.0_f64, 1.0_f64);
-    for around in around {
-        to_own = to_own.min(around.dot(own));
-        to_other = to_other.min(around.dot(normal));
-    }
-    if to_own < FACES && to_other > FACES_NOT {
-        return (turned, None);
-    }
-    let is_near = || {
-        let closest = closest_on_triangle([at(q), at(p), at(other)], at(vertex)).point;
-        closest.distance(at(vertex)) <= reach
-    };
-    if to_other < FACES && to_own > FACES_NOT && other != vertex && is_near() {
-        return ([vertex, q, p, other], None);
-    }
-    // In the basis: the part along the area, and the rest by the normal equations of both edges.
-    let square = area.length_squared();
-    let second = e1.cross(normal).dot(area) / square;
-    let first = normal.cross(e2).dot(area) / square;
-    (turned, Some([first, second, normal.dot(area) / square]))
 }

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
 mod candidates;
+mod edges;
 mod fresh_pairs;
 mod oracle;
 #[cfg(feature = "serde")]

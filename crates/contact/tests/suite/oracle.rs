@@ -9,8 +9,13 @@ use incise_mesh::{ParticleId, TetId, TrianglePart, closest_on_triangle, signed_v
 
 use crate::scene::Scene;
 
-/// A vertex and the corners of a triangle.
+/// A vertex and the corners of a triangle, the least of these first.
 pub(crate) type Key = [u32; 4];
+
+pub(crate) fn key_of([vertex, a, b, c]: [u32; 4]) -> Key {
+    let turned = [[vertex, a, b, c], [vertex, b, c, a], [vertex, c, a, b]];
+    turned.into_iter().min().unwrap()
+}
 
 /// What the slow search finds.
 #[derive(Default)]
@@ -33,8 +38,29 @@ struct Slow<'a> {
     partners: BTreeMap<u32, BTreeSet<u32>>,
 }
 
+/// All candidates of edges at the present positions: each feature edge against each other one.
+pub(crate) fn expected_edges(scene: &Scene) -> BTreeSet<[u32; 4]> {
+    slow(scene).edges()
+}
+
 /// All candidates at the present positions.
 pub(crate) fn expected(scene: &Scene) -> Expected {
+    let slow = slow(scene);
+    let all: Vec<BoundaryTriangle> = scene.body.boundary().collect();
+    let mut vertices: BTreeMap<u32, Vec<BoundaryTriangle>> = BTreeMap::new();
+    for triangle in &all {
+        for p in triangle.particles {
+            vertices.entry(p.0).or_default().push(*triangle);
+        }
+    }
+    let mut expected = Expected::default();
+    for (vertex, fan) in vertices {
+        slow.vertex(vertex, &fan, &mut expected);
+    }
+    expected
+}
+
+fn slow(scene: &Scene) -> Slow<'_> {
     let state = ContactState {
         mesh: &scene.body,
         pieces: &scene.pieces,
@@ -67,18 +93,7 @@ pub(crate) fn expected(scene: &Scene) -> Expected {
             slow.fans[p.index()].push(i);
         }
     }
-    let all: Vec<BoundaryTriangle> = scene.body.boundary().collect();
-    let mut vertices: BTreeMap<u32, Vec<BoundaryTriangle>> = BTreeMap::new();
-    for triangle in &all {
-        for p in triangle.particles {
-            vertices.entry(p.0).or_default().push(*triangle);
-        }
-    }
-    let mut expected = Expected::default();
-    for (vertex, fan) in vertices {
-        slow.vertex(vertex, &fan, &mut expected);
-    }
-    expected
+    slow
 }
 
 impl Slow<'_> {
@@ -118,6 +133,59 @@ impl Slow<'_> {
         } else {
             settings.bodies.allow(body(ParticleId(vertex)), other)
         }
+    }
+
+    /// The contact with a triangle, or with the one beyond the nearest edge, if only that can be met.
+    fn key(&self, vertex: u32, fan: &[BoundaryTriangle], i: usize) -> Option<Key> {
+        let x = self.at(ParticleId(vertex));
+        let triangle = &self.triangles[i];
+        let (p, corners) = (triangle.particles, self.corners(triangle));
+        // How far inside of each side the foot of the vertex is, times the length of the side.
+        let inside = |k: usize| {
+            let along = corners[(k + 1) % 3] - corners[k];
+            self.normals[i].cross(along).dot(x - corners[k])
+        };
+        let sides = match closest_on_triangle(corners, x).part {
+            TrianglePart::Face => vec![0, 1, 2],
+            TrianglePart::Side(k) => vec![usize::from(k)],
+            TrianglePart::Corner(k) => vec![usize::from(k), usize::from(k + 2) % 3],
+        };
+        let nearest = |k: &usize, l: &usize| inside(*k).total_cmp(&inside(*l));
+        let k = sides.into_iter().min_by(nearest).unwrap();
+        let [from, to] = [p[k], p[(k + 1) % 3]];
+        let own = key_of([vertex, p[0].0, p[1].0, p[2].0]);
+        let beyond = (0..self.triangles.len()).find(|&j| {
+            let other = self.triangles[j].particles;
+            j != i && other.contains(&from) && other.contains(&to)
+        });
+        let Some(j) = beyond else { return Some(own) };
+        let other = self.triangles[j].particles;
+        let far = *other.iter().find(|c| **c != from && **c != to).unwrap();
+        let way = self.at(far) - self.at(from);
+        let faces = |normal: DVec3| {
+            let sound = fan.iter().filter(|t| self.is_sound(t));
+            let dots = sound.map(|t| self.area(t).normalize().dot(normal));
+            dots.fold(1.0, f64::min)
+        };
+        let (to_own, to_other) = (faces(self.normals[i]), faces(self.normals[j]));
+        let closest = closest_on_triangle(self.corners(&self.triangles[j]), x).point;
+        let is_swapped = self.normals[i].dot(way) < -1e-3 * way.length()
+            && to_own > -0.1
+            && to_other < -0.3
+            && far.0 != vertex
+            && closest.distance(x) <= self.scene.contacts.reach();
+        if !is_swapped {
+            return Some(own);
+        }
+        // A pair holds the vertex at the cut face that it was parted from.
+        let tag = self.triangles[j].tag;
+        let partners = self.partners.get(&vertex).into_iter().flatten();
+        let is_of_pair = |partner: &u32| {
+            let mut all = self.scene.body.boundary();
+            all.any(|t| t.tag == tag && t.particles.contains(&ParticleId(*partner)))
+        };
+        let is_held = partners.copied().any(|partner| is_of_pair(&partner));
+        (!is_held).then(|| key_of([vertex, other[0].0, other[1].0, other[2].0]))
     }
 
     fn vertex(&self, vertex: u32, fan: &[BoundaryTriangle], expected: &mut Expected) {
@@ -201,21 +269,30 @@ impl Slow<'_> {
                 outside.push((distance, i));
             }
         }
-        let key = |i: usize| {
-            let [a, b, c] = self.triangles[i].particles.map(|p| p.0);
-            [vertex, a, b, c]
-        };
+        let key = |i: usize| self.key(vertex, fan, i);
         outside.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
         expected
             .contacts
-            .extend(outside.iter().take(3).map(|o| key(o.1)));
+            .extend(outside.iter().take(3).filter_map(|o| key(o.1)));
 
         inside.sort_by(|one, other| one.0.total_cmp(&other.0).then(one.1.cmp(&other.1)));
         let touching = 0.01 * self.scene.contacts.mean_edge();
+        let ends = |closest: DVec3, around: &[usize], to: DVec3| {
+            let starts = around.iter().map(|&i| self.triangles[i].tet);
+            let ends = starts.flat_map(|tet| self.reached(tet, closest, to));
+            ends.collect::<Vec<TetId>>()
+        };
+        let is_own =
+            |tet: &TetId| self.scene.body.mesh().tets[tet.index()].contains(&ParticleId(vertex));
+        // The nearest with a way, if that is shallow.
         let valid = inside
             .iter()
             .take(8)
-            .find(|(distance, i, closest, around)| {
+            .find(|(_, _, closest, around)| {
+                let ends = ends(closest.point, around, x);
+                ends.iter().any(|tet| !is_own(tet))
+            })
+            .filter(|(distance, i, closest, around)| {
                 let normal = if closest.part == TrianglePart::Face || *distance <= touching {
                     self.normals[*i]
                 } else {
@@ -223,18 +300,10 @@ impl Slow<'_> {
                 };
                 let depth = normal.dot(closest.point - x);
                 let twice = closest.point - normal * (2.0 * depth);
-                let ends = |to: DVec3| {
-                    let starts = around.iter().map(|&i| self.triangles[i].tet);
-                    let ends = starts.flat_map(|tet| self.reached(tet, closest.point, to));
-                    ends.collect::<Vec<TetId>>()
-                };
-                let is_own = |tet: &TetId| {
-                    self.scene.body.mesh().tets[tet.index()].contains(&ParticleId(vertex))
-                };
-                !ends(twice).is_empty() && ends(x).iter().any(|tet| !is_own(tet))
+                !ends(closest.point, around, twice).is_empty()
             });
         if let Some((_, i, ..)) = valid {
-            expected.contacts.insert(key(*i));
+            expected.contacts.extend(key(*i));
             expected.inside.insert(vertex);
             return;
         }
@@ -251,6 +320,121 @@ impl Slow<'_> {
         if others.any(contains) {
             expected.deep.insert(vertex);
         }
+    }
+
+    fn edges(&self) -> BTreeSet<[u32; 4]> {
+        let positions = &self.state.positions;
+        // Both triangles of each edge, first the one in which it runs upward.
+        let mut around: BTreeMap<[u32; 2], [Option<BoundaryTriangle>; 2]> = BTreeMap::new();
+        for triangle in self.scene.body.boundary() {
+            let p = triangle.particles.map(|p| p.0);
+            for k in 0..3 {
+                let [from, to] = [p[k], p[(k + 1) % 3]];
+                let side = usize::from(from > to);
+                around.entry([from.min(to), from.max(to)]).or_default()[side] = Some(triangle);
+            }
+        }
+        let rest = &self.scene.body.mesh().positions;
+        let normal_of = |triangle: &BoundaryTriangle, at: &[DVec3]| {
+            let [a, b, c] = triangle.particles.map(|p| at[p.index()]);
+            (b - a).cross(c - a).normalize()
+        };
+        let mut features = Vec::new();
+        for (ends, triangles) in around {
+            let [Some(one), Some(two)] = triangles else {
+                continue;
+            };
+            let at_rest = normal_of(&one, rest).angle_between(normal_of(&two, rest));
+            let is_feature = one.tag != two.tag || at_rest.cos() < 0.766;
+            let is_sound = self.is_sound(&one) && self.is_sound(&two);
+            let far = |triangle: &BoundaryTriangle| {
+                let mut corners = triangle.particles.into_iter();
+                let far = corners.find(|p| !ends.contains(&p.0)).unwrap();
+                let [a, b] = ends.map(|p| positions[p as usize]);
+                (self.at(far) - a).reject_from(b - a).normalize()
+            };
+            if !(is_feature && is_sound) {
+                continue;
+            }
+            let n = normal_of(&one, positions);
+            if n.dot(far(&two)) < -1e-3 {
+                features.push((ends, [one, two], [far(&one), far(&two)]));
+            }
+        }
+        let mut found = BTreeSet::new();
+        for (i, (ends, tets, far)) in features.iter().enumerate() {
+            for (others, other_tets, other_far) in &features[i + 1..] {
+                let none = BTreeSet::new();
+                let held = |p: &u32| self.partners.get(p).unwrap_or(&none).clone();
+                let meets =
+                    |p: &u32| others.contains(p) || held(p).iter().any(|q| others.contains(q));
+                if ends.iter().any(meets)
+                    || !self.may_touch(ends[0], tets[0].tet, other_tets[0].tet)
+                {
+                    continue;
+                }
+                let [a, b] = ends.map(|p| positions[p as usize]);
+                let [c, d] = others.map(|p| positions[p as usize]);
+                let across = (b - a).normalize().cross((d - c).normalize());
+                if across.length() <= 0.05 {
+                    continue;
+                }
+                // Where both lines are closest, in coordinates along them.
+                let lines = glam::DMat3::from_cols(b - a, c - d, across).inverse() * (c - a);
+                let clamped = |p: f64| p.clamp(0.0, 1.0);
+                let to = |x: DVec3, from: DVec3, end: DVec3| {
+                    let t = (x - from).dot(end - from) / (end - from).length_squared();
+                    from.lerp(end, clamped(t)).distance(x)
+                };
+                let meet = [lines.x, lines.y].iter().all(|p| (0.0..=1.0).contains(p));
+                let (p, q) = (a.lerp(b, clamped(lines.x)), c.lerp(d, clamped(lines.y)));
+                let mut distance = to(a, c, d)
+                    .min(to(b, c, d))
+                    .min(to(c, a, b))
+                    .min(to(d, a, b));
+                if meet {
+                    distance = distance.min(p.distance(q));
+                }
+                if distance > self.scene.contacts.reach() {
+                    continue;
+                }
+                let is_above = |n: DVec3| {
+                    far.iter().all(|far| far.dot(n) >= -0.1)
+                        && other_far.iter().all(|far| far.dot(n) <= 0.1)
+                };
+                let n = across.normalize();
+                let n = match [is_above(n), is_above(-n)] {
+                    [true, false] => n,
+                    [false, true] => -n,
+                    _ => continue,
+                };
+                let gap = n.dot(p - q);
+                // From one edge to the other through the tets behind the one, and as far again.
+                let has_way =
+                    |tets: &[BoundaryTriangle; 2], [from, to]: [DVec3; 2], own: &[u32; 2]| {
+                        let ways = |to: DVec3| -> Vec<TetId> {
+                            let starts = tets.iter().map(|triangle| triangle.tet);
+                            starts.flat_map(|tet| self.reached(tet, from, to)).collect()
+                        };
+                        let is_other = |tet: &TetId| {
+                            let corners = self.scene.body.mesh().tets[tet.index()];
+                            own.iter().all(|p| !corners.contains(&ParticleId(*p)))
+                        };
+                        ways(to).iter().any(is_other) && !ways(from + (to - from) * 2.0).is_empty()
+                    };
+                let is_valid = if gap >= 0.0 {
+                    true
+                } else if meet {
+                    has_way(other_tets, [q, p], ends) || has_way(tets, [p, q], others)
+                } else {
+                    gap > -0.01 * self.scene.contacts.mean_edge()
+                };
+                if is_valid {
+                    found.insert([ends[0], ends[1], others[0], others[1]]);
+                }
+            }
+        }
+        found
     }
 
     /// The tets that contain the end of a segment and are reached from a tet along it: each tet that the segment passes
@@ -318,7 +502,7 @@ fn barycentric(corners: [DVec3; 4], x: DVec3) -> [f64; 4] {
 /// The candidates of the detector.
 pub(crate) fn found(scene: &Scene) -> BTreeSet<Key> {
     let contacts = scene.contacts.faces().iter();
-    let found: BTreeSet<Key> = contacts.map(|contact| contact.particles).collect();
+    let found: BTreeSet<Key> = contacts.map(|contact| key_of(contact.particles)).collect();
     assert_eq!(found.len(), scene.contacts.faces().len(), "each once");
     found
 }

@@ -3,9 +3,10 @@
 use glam::{DQuat, DVec3};
 use incise_contact::{BodyPairs, ContactDetector, ContactError, ContactSettings, FaceContact};
 use incise_mesh::{ParticleId, TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 
 use crate::oracle::compare;
-use crate::scene::{FRAME, Scene, jittered_box};
+use crate::scene::{FRAME, Scene, direction, jittered_box, noise};
 
 fn moved(mut mesh: TetMesh, by: DVec3) -> TetMesh {
     for x in &mut mesh.positions {
@@ -296,8 +297,145 @@ fn pushed_together_again() {
     }
 }
 
+/// A vertex that has passed the middle of a thin plate is pushed out through the wide face that it came in by, also if
+/// the narrow one at the rim faces it, too, and is less deep than half of the width there.
+#[test]
+fn a_thin_plate_is_left_by_the_nearest_way() {
+    let plate = kuhn_box([12, 4, 1], DVec3::new(1.2, 0.4, 0.02));
+    // A box that is turned so that its lowest corner points down and towards the rim at x = 0.
+    let mut spike = kuhn_box([1; 3], DVec3::splat(0.3));
+    let turn = DQuat::from_rotation_arc(
+        DVec3::ONE.normalize(),
+        DVec3::new(0.5, 0.0, 1.0).normalize(),
+    );
+    for x in &mut spike.positions {
+        *x = turn * *x + DVec3::new(0.05, 0.21, 0.02 - 0.012);
+    }
+    let mut scene = Scene::new(&[plate, spike], ContactSettings::default());
+    scene.update();
+    compare(&scene);
+    let tip = scene.positions.len() - 8;
+    let at = DVec3::new(0.05, 0.21, 0.008);
+    assert!(scene.positions[tip].distance(at) < 1e-12);
+    let of_tip = |contact: &&FaceContact| contact.particles[0] as usize == tip;
+    let contacts: Vec<_> = scene.contacts.faces().iter().filter(of_tip).collect();
+    let inside = contacts.iter().filter(|c| c.gap(&scene.positions) < 0.0);
+    let inside: Vec<_> = inside.map(|c| c.normal_at(&scene.positions)).collect();
+    assert_eq!(inside.len(), 1, "{contacts:?}");
+    assert!(inside[0].z > 0.999, "{inside:?}");
+}
+
+/// A way out through three thin layers of tets is found, although hundreds of tets are fewer steps away.
+#[test]
+fn the_nearest_way_out_of_thin_layers() {
+    let layers = kuhn_box([3, 3, 10], DVec3::new(3.0, 3.0, 0.5));
+    let probe = moved(
+        kuhn_box([8; 3], DVec3::splat(0.04)),
+        DVec3::new(1.4, 1.55, 0.33),
+    );
+    let mut scene = Scene::new(&[layers, probe], ContactSettings::default());
+    scene.update();
+    assert!(scene.contacts.reach() < 0.1, "no triangle is near");
+    assert_eq!((scene.contacts.deep(), scene.contacts.buried()), (386, 0));
+    let tops = scene.contacts.faces().iter();
+    let tops = tops.filter(|c| c.normal_at(&scene.positions).z > 0.999);
+    assert!(
+        tops.count() >= 386 - 17 * 8,
+        "all but those that only face downward"
+    );
+}
+
+/// Past the rim of what they rest on, vertices are not held by its plane, whatever part of the surface is closest to
+/// them: a plate lies over a box and its overhanging ends hang a little below the top of the box.
+#[test]
+fn past_a_rim_nothing_is_held() {
+    for shift in [0.0, 0.07, 0.31] {
+        let below = kuhn_box([3; 3], DVec3::ONE);
+        let plate = moved(
+            kuhn_box([12, 12, 1], DVec3::new(2.4, 2.4, 0.1)),
+            DVec3::new(-0.7 + shift, -0.7 + shift, 1.0),
+        );
+        let settings = ContactSettings {
+            skin: 1.0,
+            ..ContactSettings::default()
+        };
+        let mut scene = Scene::new(&[below, plate], settings);
+        for x in &mut scene.positions[64..] {
+            let over = |c: f64| (-c).max(c - 1.0).max(0.0);
+            x.z -= 0.1 * over(x.x).max(over(x.y)) + 1e-4;
+        }
+        let is_over =
+            |x: DVec3| x.x >= -1e-9 && x.x <= 1.0 + 1e-9 && x.y >= -1e-9 && x.y <= 1.0 + 1e-9;
+        let settled = scene.positions.clone();
+        // Found where they are, and found a little aside and then moved there without another search.
+        for aside in [
+            DVec3::ZERO,
+            DVec3::new(0.03, 0.02, 0.0),
+            DVec3::new(-0.04, 0.01, 0.0),
+        ] {
+            scene.positions.clone_from(&settled);
+            scene.shift(1, aside);
+            scene.search();
+            compare(&scene);
+            scene.positions.clone_from(&settled);
+            let (mut held, mut beside) = (0, 0);
+            for contact in scene.contacts.faces() {
+                let x = scene.positions[contact.particles[0] as usize];
+                if contact.particles[0] < 64 || contact.particles[1] >= 64 {
+                    continue;
+                }
+                let gap = contact.gap(&scene.positions);
+                // What touched the rim is held a quarter of an altitude past it.
+                let margin = if aside == DVec3::ZERO { 0.0 } else { 0.09 };
+                let near = x.clamp(DVec3::ZERO, DVec3::ONE).with_z(x.z);
+                if is_over(x) {
+                    held += usize::from(gap < 0.0);
+                } else if x.distance(near) > margin {
+                    beside += 1;
+                    assert!(gap > 0.0, "{x} is held: {gap} by {contact:?}");
+                }
+            }
+            assert!(held >= 16 && beside >= 8, "{held} held, {beside} beside");
+        }
+    }
+}
+
+/// Planes and limits turn with the triangle.
+#[test]
+fn contacts_turn_with_their_bodies() {
+    let ball = generate(Shape::Sphere, 800).unwrap();
+    let top = ball.positions.iter().fold(0.0_f64, |top, x| top.max(x.z));
+    let above = moved(ball.clone(), DVec3::new(0.3, 0.2, 1.95) * top);
+    let bodies = [ball, above];
+    let settings = ContactSettings {
+        skin: 1.0,
+        ..ContactSettings::default()
+    };
+    let mut scene = Scene::new(&bodies, settings);
+    scene.update();
+    let rest = scene.positions.clone();
+    let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 1.1);
+    let turned: Vec<DVec3> = rest.iter().map(|x| turn * *x + DVec3::X).collect();
+    let contacts = scene.contacts.faces();
+    for contact in contacts {
+        assert!((contact.gap(&turned) - contact.gap(&rest)).abs() < 1e-12);
+        let normal = turn * contact.normal_at(&rest);
+        assert!(contact.normal_at(&turned).distance(normal) < 1e-9);
+    }
+    let with = |has: &dyn Fn(&FaceContact) -> bool| contacts.iter().filter(|c| has(c)).count();
+    let counts = [with(&|c| c.beyond.is_some()), with(&|c| c.limit.is_some())];
+    assert!(
+        counts.iter().all(|count| *count > 3),
+        "{counts:?} of {}",
+        contacts.len()
+    );
+}
+
 fn same(one: &ContactDetector, other: &ContactDetector) -> bool {
-    one.faces() == other.faces() && one.pairs() == other.pairs() && one.deep() == other.deep()
+    one.faces() == other.faces()
+        && one.edges() == other.edges()
+        && one.pairs() == other.pairs()
+        && one.deep() == other.deep()
 }
 
 /// Results have the same bits for any number of threads.
@@ -329,6 +467,7 @@ fn on_several_threads() {
     };
     let one = run(1);
     assert!(one.iter().all(|contacts| contacts.faces().len() > 50));
+    assert!(one.iter().any(|contacts| contacts.edges().len() > 10));
     for threads in [2, 3] {
         let many = run(threads);
         assert!(one.iter().zip(&many).all(|(one, other)| same(one, other)));
@@ -403,7 +542,7 @@ fn when_a_search_is_due() {
     // A fast body is looked for further away, and asks for shorter frames.
     let reach = scene.contacts.reach();
     for p in scene.particles_of(1) {
-        scene.velocities[p].z -= 0.2 * scene.contacts.mean_edge() / FRAME;
+        scene.velocities[p].z -= 0.25 * scene.contacts.mean_edge() / FRAME;
     }
     assert!(scene.update().searched);
     assert!(scene.contacts.reach() > reach);
@@ -418,6 +557,148 @@ fn when_a_search_is_due() {
             intervals
         );
     }
+}
+
+/// Motion asks for a search only where it may bring surfaces together.
+#[test]
+fn what_asks_for_no_search() {
+    let cube = |at: DVec3| moved(kuhn_box([3; 3], DVec3::ONE), at);
+    let bodies = [
+        cube(DVec3::ZERO),
+        cube(DVec3::new(0.0, 0.0, 1.02)),
+        cube(DVec3::new(50.0, 0.0, 0.0)),
+    ];
+    let settings = ContactSettings {
+        self_contact: false,
+        ..ContactSettings::default()
+    };
+    let mut scene = Scene::new(&bodies, settings);
+    assert!(scene.update().searched);
+    // A body far away flies off.
+    for _ in 0..5 {
+        scene.shift(2, DVec3::new(0.0, 3.0, 0.0));
+        for p in scene.particles_of(2) {
+            scene.velocities[p] = DVec3::new(0.0, 180.0, 0.0);
+        }
+        assert!(!scene.update().searched, "far away");
+    }
+    assert_eq!(scene.contacts.faces().len(), 32);
+    // When it comes near, it matters.
+    let back = scene.positions[128] - DVec3::new(0.0, 0.0, 2.05);
+    scene.velocities.fill(DVec3::ZERO);
+    scene.shift(2, -back);
+    assert!(scene.update().searched);
+    assert!(scene.contacts.faces().len() > 40, "it lies on the others");
+    // What approaches by more than the search looks ahead at all asks for parts of a frame, not for a search in each.
+    for p in scene.particles_of(1) {
+        scene.velocities[p].x = 100.0;
+    }
+    assert!(scene.update().searched, "it reaches further now");
+    for _ in 0..3 {
+        assert!(!scene.update().searched, "nothing has moved");
+    }
+}
+
+/// A body that tumbles does not approach itself.
+#[test]
+fn tumbling_asks_for_no_search() {
+    let mut scene = Scene::new(&[jittered_box(4, 0.2, 7)], ContactSettings::default());
+    assert!(scene.update().searched);
+    let rest = scene.positions.clone();
+    let spin = DVec3::new(0.6, -1.0, 0.8);
+    for frame in 1..=8 {
+        let turn = DQuat::from_scaled_axis(spin * FRAME * f64::from(frame));
+        for (p, rest) in rest.iter().enumerate() {
+            let from = turn * (*rest - 0.5);
+            scene.positions[p] = from + DVec3::new(0.5, 0.5, 0.5 - 0.1 * f64::from(frame));
+            scene.velocities[p] = spin.cross(from) - DVec3::Z * (0.1 / FRAME);
+        }
+        // What is left is half a square of the angle over the body.
+        assert!(!scene.update().searched, "frame {frame}");
+    }
+}
+
+/// A vertex that slides by half a barycentric coordinate on a sliver has hardly moved: no search.
+#[test]
+fn slivers_ask_for_no_search() {
+    let mut below = kuhn_box([4, 4, 1], DVec3::new(1.0, 1.0, 0.25));
+    // A row of slivers on the top.
+    for x in &mut below.positions {
+        if (x.y - 0.5).abs() < 1e-9 {
+            x.y = 0.2505;
+        }
+    }
+    let above = moved(
+        kuhn_box([1; 3], DVec3::splat(0.2)),
+        DVec3::new(0.3, 0.2502, 0.2501),
+    );
+    let mut scene = Scene::new(&[below, above], ContactSettings::default());
+    assert!(scene.update().searched);
+    assert!(scene.contacts.faces().len() >= 4);
+    for _ in 0..4 {
+        scene.shift(1, DVec3::new(0.0, 1e-3, 0.0));
+        assert!(!scene.update().searched);
+    }
+    scene.shift(1, DVec3::new(0.0, 0.1, 0.0));
+    assert!(scene.update().searched);
+}
+
+/// Between two searches no contact is missed: what a search would find that may touch within the frame, is known.
+#[test]
+fn kept_lists_are_complete() {
+    let (mut kept, mut compared) = (0, 0);
+    for seed in 0..6 {
+        let ball = generate(Shape::Sphere, 300).unwrap();
+        let top = ball.positions.iter().fold(0.0_f64, |top, x| top.max(x.z));
+        let at = [
+            DVec3::ZERO,
+            DVec3::new(0.2, 0.1, 2.02),
+            DVec3::new(2.05, 0.3, 0.9),
+            DVec3::new(0.4, -2.1, 0.5),
+        ];
+        let bodies: Vec<_> = at.map(|at| moved(ball.clone(), at * top)).to_vec();
+        let count = ball.positions.len();
+        let mut scene = Scene::new(&bodies, ContactSettings::default());
+        for _ in 0..40 {
+            for (i, x) in scene.positions.iter_mut().enumerate() {
+                let (body, center) = (i / count, at[i / count] * top);
+                let spin = direction(seed, body) * 0.4 * noise(seed, body + 9);
+                let drift = direction(seed ^ 3, body) * 0.3 * top;
+                scene.velocities[i] = drift + spin.cross(*x - center);
+                *x += scene.velocities[i] * FRAME;
+            }
+            if scene.update().searched {
+                continue;
+            }
+            kept += 1;
+            let mut fresh = scene.contacts.clone();
+            fresh.search_again();
+            fresh.update(&incise_contact::ContactState {
+                mesh: &scene.body,
+                pieces: &scene.pieces,
+                positions: &scene.positions,
+                velocities: &scene.velocities,
+                frame_time: FRAME,
+            });
+            let skin = fresh.settings().skin * fresh.mean_edge();
+            let margin = fresh.reach() - skin;
+            for contact in fresh.faces() {
+                let [vertex, corner, ..] = contact.particles;
+                let gap = contact.gap(&scene.positions);
+                if gap < -0.02 * fresh.mean_edge() || gap > margin + 0.5 * skin {
+                    continue;
+                }
+                compared += 1;
+                let same = |known: &&FaceContact| {
+                    let [v, c, ..] = known.particles;
+                    v == vertex && c as usize / count == corner as usize / count
+                };
+                let known = scene.contacts.faces().iter().find(same);
+                assert!(known.is_some(), "{contact:?} at {gap} is not known");
+            }
+        }
+    }
+    assert!(kept > 100 && compared > 100, "{kept} and {compared}");
 }
 
 /// What degenerates is not touched and does no harm.
@@ -441,7 +722,7 @@ fn collapsed_and_inverted() {
         for contact in scene.contacts.faces() {
             assert!(contact.particles[1] < 64, "no triangle of it is touched");
             assert!(contact.gap(&scene.positions).is_finite());
-            assert!(contact.normal.iter().all(|c| c.is_finite()));
+            assert!(contact.normal_at(&scene.positions).is_finite());
         }
     }
     scene.positions[64..].fill(DVec3::new(0.5, 0.5, 1.0));

@@ -1,11 +1,11 @@
-//! [`Contacts`]: pairs and vertices against triangles on the device.
+//! [`Contacts`]: pairs, vertices against triangles and edges against edges on the device.
 //!
 //! The host finds contacts, colors them and hands them to its solver; here they are stored in solving order, each color
 //! padded to whole groups of 64. A color is a dispatch, and consecutive colors of one group are one dispatch together.
 //! The contacts of a tail, which one thread of the host solves in order, are divided into steps: a contact comes one step
 //! after the last one before it that has a particle of it. So contacts that meet are solved in the order of the host, and
 //! each step runs in parallel. Only what differs from the last list is sent. Twin: `constraints/contacts.rs` of
-//! incise-xpbd. Cost: 48 bytes a contact, 16 more with several iterations.
+//! incise-xpbd. Cost: 64 bytes a contact, 16 more with several iterations.
 
 use incise_graph::Rows;
 use incise_xpbd::{Solver, StepSettings};
@@ -23,8 +23,10 @@ use crate::{GpuContext, GpuError};
 
 /// In place of a particle that a contact does not have.
 const NONE: u32 = u32::MAX;
-/// Words of a contact in each array.
+/// Words of a contact in each array but that of its numbers.
 const WORDS: usize = 4;
+/// Words of the numbers that describe a contact.
+const NUMBERS: usize = 8;
 
 /// All contacts of a solver.
 #[derive(Debug)]
@@ -95,11 +97,10 @@ impl Contacts {
             }
         }
         let mut corners = vec![NONE; WORDS * end];
-        let mut numbers = vec![0; WORDS * end];
+        let mut numbers = vec![0; NUMBERS * end];
         for (contact, &place) in solver.contact_data().zip(&self.places) {
-            let range = WORDS * place as usize..WORDS * (place as usize + 1);
-            corners[range.clone()].copy_from_slice(&contact.particles);
-            numbers[range].copy_from_slice(&contact.numbers.map(f32::to_bits));
+            corners[words::<WORDS>(place)].copy_from_slice(&contact.particles);
+            numbers[words::<NUMBERS>(place)].copy_from_slice(&contact.numbers.map(f32::to_bits));
         }
         self.corners.set(gpu, corners)?;
         self.numbers.set(gpu, numbers)?;
@@ -245,13 +246,11 @@ impl Contacts {
         }
         let mut last = vec![None; solver.particle_count()];
         for (contact, (data, &place)) in data.iter().zip(&self.places).enumerate() {
-            let place = place as usize;
-            let range = WORDS * place..WORDS * (place + 1);
-            let same_numbers = numbers[range.clone()] == data.numbers.map(f32::to_bits);
-            if corners[range] != data.particles || !same_numbers {
+            let same_numbers = numbers[words::<NUMBERS>(place)] == data.numbers.map(f32::to_bits);
+            if corners[words::<WORDS>(place)] != data.particles || !same_numbers {
                 return differs(&format!("contact {contact}"));
             }
-            let turn = turns[place / THREADS];
+            let turn = turns[place as usize / THREADS];
             for p in data.particles.into_iter().filter(|&p| p != NONE) {
                 let before = std::mem::replace(&mut last[p as usize], turn);
                 if turn.is_none() || before >= turn {
@@ -275,6 +274,11 @@ impl Contacts {
         ];
         buffers.into_iter().map(Buffer::size).sum()
     }
+}
+
+/// The words of a contact in an array with `N` for each.
+fn words<const N: usize>(place: u32) -> std::ops::Range<usize> {
+    N * place as usize..N * (place as usize + 1)
 }
 
 /// The contacts in solving order by what runs at the same time: a row for each color and for each step of a tail.

@@ -6,8 +6,8 @@ use incise_gpu::{ClusterMapping, GpuContext, GpuError, GpuSolver};
 use incise_graph::{ColorId, Coloring, Incidence, Schedule};
 use incise_mesh::TetMesh;
 use incise_xpbd::{
-    Collider, ContactLaw, ContactState, FaceContact, Method, PairContact, Solver, StepSettings,
-    XpbdError,
+    Collider, ContactLaw, ContactState, EdgeContact, FaceContact, FaceLimit, Method, PairContact,
+    Solver, StepSettings, SurfaceContact, XpbdError,
 };
 use proptest::prelude::*;
 
@@ -27,16 +27,16 @@ const HUB: u32 = 40;
 #[derive(Clone, Debug, Default)]
 struct List {
     pairs: Vec<PairContact>,
-    faces: Vec<FaceContact>,
+    surfaces: Vec<SurfaceContact>,
 }
 
 impl List {
     fn set(&self, solver: &mut Solver<f32>, law: &ContactLaw) {
         let count = solver.particle_count();
         let pairs = colors(count, self.pairs.iter().map(|pair| pair.particles));
-        let faces = colors(count, self.faces.iter().map(|face| face.particles));
+        let surfaces = colors(count, self.surfaces.iter().map(SurfaceContact::particles));
         solver
-            .set_contacts(law, (&self.pairs, &pairs), (&self.faces, &faces))
+            .set_contacts(law, (&self.pairs, &pairs), (&self.surfaces, &surfaces))
             .unwrap();
     }
 }
@@ -67,6 +67,14 @@ fn direction(seed: u64) -> DVec3 {
     dvec3(noise(seed), noise(seed + 1), noise(seed + 2)) - 0.5
 }
 
+/// A limit in a random direction.
+fn limit(seed: u64) -> FaceLimit {
+    FaceLimit {
+        normal: direction(seed).to_array(),
+        distance: 0.1 * noise(seed + 3),
+    }
+}
+
 /// Contacts between particles and triangles of a body picked at random: with and without a second plane, thick ones, and
 /// many on one vertex, which need a tail.
 fn random(mesh: &TetMesh, seed: u64, number: u32) -> List {
@@ -86,10 +94,20 @@ fn random(mesh: &TetMesh, seed: u64, number: u32) -> List {
         let tet = mesh.tets[picked(seed + k + 3, mesh.tets.len()) as usize].map(|p| p.0);
         if !tet[..3].contains(&vertex) {
             let n = direction(seed + k + 20);
-            list.faces.push(FaceContact {
+            let face = FaceContact {
                 particles: [vertex, tet[0], tet[1], tet[2]],
                 beyond: (k % 300 == 0).then(|| n.to_array()),
+                limit: (k % 700 == 0).then(|| limit(seed + k + 30)),
                 thickness: if k % 500 == 0 { 0.02 } else { 0.0 },
+            };
+            let edges = EdgeContact {
+                particles: face.particles,
+                normal: n,
+                thickness: face.thickness,
+            };
+            list.surfaces.push(match k % 400 {
+                0 => edges.into(),
+                _ => face.into(),
             });
         }
     }
@@ -302,17 +320,28 @@ fn degenerate_contacts() {
                 let face = FaceContact {
                     particles: [0, 1, 2, 3],
                     beyond,
+                    limit: beyond.map(|normal| FaceLimit {
+                        normal,
+                        distance: 0.1,
+                    }),
                     thickness: 0.0,
                 };
                 let pair = PairContact {
                     particles: [1, 0],
                     normal: DVec3::Z,
                 };
-                let list = List {
-                    pairs: vec![pair],
-                    faces: vec![face],
+                let edges = EdgeContact {
+                    particles: [0, 1, 2, 3],
+                    normal: DVec3::from_array(beyond.unwrap_or([0.0, 0.1, -1.0])),
+                    thickness: 0.0,
                 };
-                assert_equal(gpu, &both(gpu, || dust(&triangle, fixed, &list)));
+                for surface in [face.into(), edges.into()] {
+                    let list = List {
+                        pairs: vec![pair],
+                        surfaces: vec![surface],
+                    };
+                    assert_equal(gpu, &both(gpu, || dust(&triangle, fixed, &list)));
+                }
             }
         }
     }
@@ -373,7 +402,13 @@ proptest! {
             particles.sort_unstable();
             if particles.windows(2).all(|two| two[0] < two[1]) {
                 let beyond = (k % 2 == 0).then(|| direction(seed + 90 + k).to_array());
-                list.faces.push(FaceContact { particles, beyond, thickness: 0.01 * (k % 3) as f64 });
+                let limit = (k % 3 == 0).then(|| limit(seed + 95 + k));
+                let thickness = 0.01 * (k % 3) as f64;
+                list.surfaces.push(if k % 5 == 0 {
+                    EdgeContact { particles, normal: direction(seed + 97 + k), thickness }.into()
+                } else {
+                    FaceContact { particles, beyond, limit, thickness }.into()
+                });
             }
         }
         let [device, host] = both(gpu, || dust(&positions, &[2], &list));
@@ -411,7 +446,7 @@ fn contacts_cost_what_they_are() {
     let same = step(&mut device);
     assert_eq!(same.uploaded_bytes, 0, "nothing has changed");
     assert!(same.dispatches > without.dispatches + 4);
-    let count = list.pairs.len() + list.faces.len();
+    let count = list.pairs.len() + list.surfaces.len();
     assert!(same.dispatches < without.dispatches + 4 * count as u64);
     // One normal: a piece of 256 bytes.
     let mut other = list.clone();

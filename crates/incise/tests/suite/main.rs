@@ -10,6 +10,8 @@ mod builder;
 mod conservation;
 mod constraints;
 mod contact;
+mod contact_cases;
+mod contact_edges;
 mod cutting;
 mod determinism;
 mod edits;

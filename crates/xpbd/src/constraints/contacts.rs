@@ -1,14 +1,27 @@
 //! [`Contacts`]: bodies made of tets that touch, hard and one-sided, with Coulomb friction.
 //!
 //! A contact is a linear combination of particles along a normal, `C = n · Σ sₖ xₖ - h ≥ 0` with `Σ sₖ = 0`: a vertex
-//! against the point below it on a triangle, or a particle against its partner on the other side of a fresh cut. The
-//! point on the triangle is found in each solve: the foot of the vertex, kept inside of the triangle with its sides
-//! moved outward by a quarter.
+//! against the point below it on a triangle, two edges at the points where they are closest, or a particle against its
+//! partner on the other side of a fresh cut.
+//!
+//! The point on the triangle is found in each solve: the foot of the vertex in the plane of the triangle. Where the foot
+//! lies beyond a side by more than a quarter of the altitude, a point on the sides moved outward by a quarter takes its
+//! place: weights below -1/4 become -1/4, and the others shrink towards -1/4 in proportion until the sum is 1 again. That
+//! point is not the closest one, which would need a distinction of cases; it decides how the force is distributed, and it
+//! does not change `C`, since all of the plane has the same distance.
+//!
+//! Two edges touch while the points where their lines are closest lie on both; otherwise a corner of one of them is what
+//! touches, and that is the contact of a vertex. Their normal is given, for the sign of the cross product of both
+//! directions tells inside from outside only as long as they have not turned past each other.
 //!
 //! Near a convex edge a vertex is outside if it is outside of one of both surfaces that meet there. So a contact may
 //! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that takes
 //! less to satisfy. With one plane only, or with a normal in between, a vertex of a floor catches the front of a block
 //! that slides over it. The normal of the second plane is given in the basis of the triangle, so it turns with it.
+//!
+//! A plane has no end, a surface has: past a rim a vertex would be held where there is nothing below it. So a contact may
+//! have a limit, a direction away from the nearest edge and a distance along it beyond which the vertex touches nothing.
+//! A limit only opens a contact, it never presses.
 //!
 //! What the substep adds to the overlap is stopped in full; the overlap that was there at its start is taken back over
 //! a recovery time τ: `C̃ = C - α min(C₀, 0)` with `1 - α = min(1, Δt/τ)`. So an overlap parts at its depth over τ, and
@@ -17,7 +30,7 @@
 //! `wₖ sₖ Δλ n`, and of what the two sides slid along each other in this substep up to `μ λ W` is taken back. That is
 //! the law that colliders have. The relaxation of the solver does not scale contacts: damped contacts sink in.
 //!
-//! Colors are solved one after the other, pairs before faces; contacts of a color beyond the sixteenth of their kind
+//! Colors are solved one after the other, pairs before the others; contacts of a color beyond the sixteenth of their kind
 //! form a tail that one thread solves, since a vertex that touches dozens of triangles needs dozens of colors of few
 //! contacts each.
 //!
@@ -44,6 +57,8 @@ const PARALLEL_COLORS: usize = 16;
 const CONTACTS_A_THREAD: usize = 128;
 /// By how much the foot of a vertex may lie outside of a side of its triangle, in altitudes.
 const MARGIN: f64 = 0.25;
+/// The sine of the angle between two edges up to which they count as parallel.
+const PARALLEL: f64 = 0.01;
 
 /// The law of all contacts of a solver. See [`crate::Solver::set_contacts`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,6 +81,17 @@ pub struct PairContact {
     pub normal: DVec3,
 }
 
+/// Where the surface of a contact ends. See [`FaceContact::limit`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct FaceLimit {
+    /// The direction away from the surface, of any length but 0, as coefficients of the edges `e₁ = x₂ - x₁` and
+    /// `e₂ = x₃ - x₁` of the triangle and of `e₁ × e₂`.
+    pub normal: [f64; 3],
+    /// How far in m along the direction the contact goes beyond the edge from the first corner to the second, at least 0.
+    pub distance: f64,
+}
+
 /// A vertex that stays on the outer side of a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -76,35 +102,87 @@ pub struct FaceContact {
     /// length but 0, as coefficients of the edges `e₁ = x₂ - x₁` and `e₂ = x₃ - x₁` and of `e₁ × e₂`. A vertex on the
     /// outer side of that plane through the edge touches nothing.
     pub beyond: Option<[f64; 3]>,
+    /// Where the surface ends near the edge from the first corner to the second: a vertex whose way from the closest point
+    /// of that edge goes further in this direction touches nothing. Without a limit the plane goes on forever.
+    pub limit: Option<FaceLimit>,
     /// The distance that is kept in m, at least 0.
     pub thickness: f64,
+}
+
+/// Two edges that stay on their sides of each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EdgeContact {
+    /// The ends of the one edge, then those of the other.
+    pub particles: [u32; 4],
+    /// From the second edge to the side that the first one stays on, of any length but 0.
+    pub normal: DVec3,
+    /// The distance that is kept in m, at least 0.
+    pub thickness: f64,
+}
+
+/// A contact between two surfaces.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub enum SurfaceContact {
+    /// A vertex and a triangle.
+    Face(FaceContact),
+    /// Two edges.
+    Edges(EdgeContact),
+}
+
+impl SurfaceContact {
+    /// The particles, as [`FaceContact::particles`] or [`EdgeContact::particles`].
+    #[must_use]
+    pub fn particles(&self) -> [u32; 4] {
+        match self {
+            Self::Face(contact) => contact.particles,
+            Self::Edges(contact) => contact.particles,
+        }
+    }
+}
+
+impl From<FaceContact> for SurfaceContact {
+    fn from(contact: FaceContact) -> Self {
+        Self::Face(contact)
+    }
+}
+
+impl From<EdgeContact> for SurfaceContact {
+    fn from(contact: EdgeContact) -> Self {
+        Self::Edges(contact)
+    }
 }
 
 /// A contact after a frame. See [`crate::Solver::contacts`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactState {
-    /// The vertex, or the second particle of a pair.
+    /// The vertex, the first end of the first edge, or the second particle of a pair.
     pub vertex: u32,
-    /// The first corner of the triangle, or the first particle of a pair.
+    /// The first corner of the triangle, the first end of the second edge, or the first particle of a pair.
     pub against: u32,
-    /// How far the vertex is on the wrong side in m; negative if the two are apart, not above 0 if the vertex lies beside
-    /// the triangle.
+    /// Where the force acts in m: at the vertex, or at the closest point of the first edge.
+    pub point: DVec3,
+    /// How far the vertex or the edge is on the wrong side in m; negative if the two are apart, not above 0 if the vertex
+    /// lies beside the triangle, or edges pass each other beyond their ends.
     pub depth: f64,
     /// The normal force in N, summed up over the substeps since the contacts were set and divided by those of the frame:
     /// the mean of a frame, or in a frame of several parts the share of the last part. 0 if the contact did not press.
     pub pressure: f64,
-    /// The force in N on the vertex with friction, as `pressure`. The other side has its opposite.
+    /// The force in N on the vertex or on the first edge with friction, as `pressure`. The other side has its opposite.
     pub force: DVec3,
 }
 
 /// A contact as plain numbers for a kernel. See [`crate::Solver::contact_data`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContactData<R> {
-    /// The particles: the two of a pair and twice [`u32::MAX`], or a vertex and the corners of a triangle.
+    /// The particles: the two of a pair and twice [`u32::MAX`], a vertex and the corners of a triangle, or the ends of two
+    /// edges.
     pub particles: [u32; 4],
-    /// Of a pair the unit normal and 0; of a vertex and a triangle [`FaceContact::beyond`], three zeros where there is
-    /// none, and the thickness.
-    pub numbers: [R; 4],
+    /// Of a pair the unit normal and zeros; of two edges the unit normal, the thickness, three zeros and -1; of a vertex
+    /// and a triangle [`FaceContact::beyond`] and the thickness, then [`FaceContact::limit`]. Three zeros stand for no
+    /// direction.
+    pub numbers: [R; 8],
 }
 
 /// Contacts that a kernel solves together: a color, or a tail. See [`crate::Solver::contact_rounds`].
@@ -157,13 +235,31 @@ fn unit<R: Float>(index: usize, normal: DVec3) -> Result<R::Vector, XpbdError> {
     Ok(R::from_dvec3(unit))
 }
 
-/// A contact of `K` particles at the present positions.
-struct Gap<R: Float, const K: usize> {
+/// A plane of a contact of `K` particles at the present positions.
+#[derive(Clone, Copy)]
+struct ContactPlane<R: Float, const K: usize> {
     normal: R::Vector,
-    /// `C` without the part of an old overlap that the substep leaves.
-    residual: R,
     /// The gradient at each particle is the normal times this; their sum is 0.
     shares: [R; K],
+    /// True for the second plane of the contact.
+    is_second: bool,
+}
+
+/// A contact of `K` particles at the present positions.
+#[derive(Clone, Copy)]
+struct Gap<R: Float, const K: usize> {
+    /// The plane that it acts along.
+    plane: ContactPlane<R, K>,
+    /// `C` without the part of an old overlap that the substep leaves.
+    residual: R,
+    /// Whether the vertex is past the end of the surface, so that there is no contact whatever `C` says.
+    is_past: bool,
+}
+
+impl<R: Float, const K: usize> Gap<R, K> {
+    fn is_open(&self) -> bool {
+        self.is_past || self.residual >= R::ZERO
+    }
 }
 
 /// A contact in the solver's precision.
@@ -172,8 +268,10 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
     /// triangle has no normal.
     fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
+    /// The first or the second plane; `None` where a triangle has no normal.
+    fn plane(&self, x: [R::Vector; K], is_second: bool) -> Option<ContactPlane<R, K>>;
     /// Whether the first particle is above or below the other side, not beside it.
-    fn faces(&self, x: [R::Vector; K]) -> bool;
+    fn is_opposite(&self, x: [R::Vector; K]) -> bool;
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -187,11 +285,15 @@ struct Pair<R: Float> {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
-struct Face<R: Float> {
+struct Surface<R: Float> {
     particles: [u32; 4],
-    /// Zeros where there is none.
+    /// Zeros where there is none. Of two edges the unit normal.
     beyond: [R; 3],
+    /// Zeros where there is none.
+    limit: [R; 3],
+    distance: R,
     thickness: R,
+    is_edges: bool,
 }
 
 impl<R: Float> Pair<R> {
@@ -203,8 +305,8 @@ impl<R: Float> Pair<R> {
     }
 }
 
-impl<R: Float> Face<R> {
-    fn new(index: usize, contact: &FaceContact) -> Result<Self, XpbdError> {
+impl<R: Float> Surface<R> {
+    fn new(index: usize, contact: &SurfaceContact) -> Result<Self, XpbdError> {
         let refuse = |what, value, range| {
             Err(XpbdError::Constraint {
                 index,
@@ -213,21 +315,49 @@ impl<R: Float> Face<R> {
                 range,
             })
         };
-        if !(contact.thickness.is_finite() && contact.thickness >= 0.0) {
-            return refuse("thickness", contact.thickness, "at least 0 and finite");
+        let thickness = match contact {
+            SurfaceContact::Face(contact) => contact.thickness,
+            SurfaceContact::Edges(contact) => contact.thickness,
+        };
+        if !(thickness.is_finite() && thickness >= 0.0) {
+            return refuse("thickness", thickness, "at least 0 and finite");
         }
-        let beyond = contact.beyond.map_or([R::ZERO; 3], |n| n.map(R::from_f64));
-        let is_none = beyond == [R::ZERO; 3];
-        if !beyond.iter().all(|n| n.is_finite()) || (contact.beyond.is_some() && is_none) {
-            let length = contact
-                .beyond
-                .map_or(0.0, |n| DVec3::from_array(n).length());
-            return refuse("normal", length, "a direction");
+        let thickness = R::from_f64(thickness);
+        let contact = match contact {
+            SurfaceContact::Face(contact) => contact,
+            SurfaceContact::Edges(contact) => {
+                return Ok(Self {
+                    particles: contact.particles,
+                    beyond: R::components(unit::<R>(index, contact.normal)?),
+                    limit: [R::ZERO; 3],
+                    distance: R::ZERO,
+                    thickness,
+                    is_edges: true,
+                });
+            }
+        };
+        let limit = contact.limit.map(|limit| limit.normal);
+        let distance = contact.limit.map_or(0.0, |limit| limit.distance);
+        if !(distance.is_finite() && distance >= 0.0) {
+            return refuse("limit distance", distance, "at least 0 and finite");
         }
+        let mut directions = [[R::ZERO; 3]; 2];
+        for (given, out) in [contact.beyond, limit].into_iter().zip(&mut directions) {
+            let Some(normal) = given else { continue };
+            *out = normal.map(R::from_f64);
+            if !out.iter().all(|n| n.is_finite()) || *out == [R::ZERO; 3] {
+                let length = DVec3::from_array(normal).length();
+                return refuse("normal", length, "a direction");
+            }
+        }
+        let [beyond, limit] = directions;
         Ok(Self {
             particles: contact.particles,
             beyond,
-            thickness: R::from_f64(contact.thickness),
+            limit,
+            distance: R::from_f64(distance),
+            thickness,
+            is_edges: false,
         })
     }
 }
@@ -242,26 +372,48 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
         let value = R::dot(self.normal, x[1] - x[0]);
         let before = R::dot(self.normal, previous[1] - previous[0]);
         Some(Gap {
-            normal: self.normal,
+            plane: self.plane(x, false)?,
             residual: new_part(value, before, kept),
-            shares: [-R::ONE, R::ONE],
+            is_past: false,
         })
     }
 
-    fn faces(&self, _x: [R::Vector; 2]) -> bool {
+    #[inline]
+    fn plane(&self, _x: [R::Vector; 2], is_second: bool) -> Option<ContactPlane<R, 2>> {
+        Some(ContactPlane {
+            normal: self.normal,
+            shares: [-R::ONE, R::ONE],
+            is_second,
+        })
+    }
+
+    fn is_opposite(&self, _x: [R::Vector; 2]) -> bool {
         true
     }
 }
 
-impl<R: Float> Contact<R, 4> for Face<R> {
-    fn particles(&self) -> [u32; 4] {
-        self.particles
-    }
+/// Both edges from the first corner of a triangle, and the vertex from there.
+type Basis<R> = [<R as Float>::Vector; 3];
 
+fn basis<R: Float>(x: [R::Vector; 4]) -> Basis<R> {
+    [x[2] - x[1], x[3] - x[1], x[0] - x[1]]
+}
+
+/// A vector from its coefficients in the basis of a triangle with this area vector.
+#[inline]
+fn combined<R: Float>([e1, e2, _]: Basis<R>, area: R::Vector, [a, b, c]: [R; 3]) -> R::Vector {
+    e1 * a + e2 * b + area * c
+}
+
+fn clamped<R: Float>(x: R, low: R, high: R) -> R {
+    let x = if x < low { low } else { x };
+    if x > high { high } else { x }
+}
+
+impl<R: Float> Surface<R> {
+    /// The plane of the triangle.
     #[inline]
-    fn gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
-        let basis = |x: [R::Vector; 4]| (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
-        let ((e1, e2, r), old) = (basis(x), basis(previous));
+    fn own_plane(&self, [e1, e2, r]: Basis<R>) -> Option<ContactPlane<R, 4>> {
         let area = R::cross(e1, e2);
         // The normal, scaled by hand: squares of areas leave the range of single precision.
         let (size, normal) = direction::<R>(area)?;
@@ -269,44 +421,142 @@ impl<R: Float> Contact<R, 4> for Face<R> {
             R::dot(R::cross(r, e2), normal) / size,
             R::dot(R::cross(e1, r), normal) / size,
         )?;
-        let residual = |normal: R::Vector, [second, third]: [R; 2]| {
-            let above = |(e1, e2, r): (R::Vector, R::Vector, R::Vector)| {
-                R::dot(normal, r - e1 * second - e2 * third) - self.thickness
-            };
-            new_part(above((e1, e2, r)), above(old), kept)
-        };
-        let mut gap = Gap {
+        Some(ContactPlane {
             normal,
-            residual: residual(normal, [second, third]),
             shares: [R::ONE, second + third - R::ONE, -second, -third],
-        };
-        let [a, b, c] = self.beyond;
-        if gap.residual >= R::ZERO || self.beyond == [R::ZERO; 3] {
-            return Some(gap);
+            is_second: false,
+        })
+    }
+
+    /// The plane beyond the edge from the first corner to the second.
+    fn plane_beyond(&self, basis: Basis<R>) -> Option<ContactPlane<R, 4>> {
+        if self.beyond == [R::ZERO; 3] {
+            return None;
         }
-        let Some((_, normal)) = direction::<R>(e1 * a + e2 * b + area * c) else {
-            return Some(gap);
-        };
-        let Some((length, along)) = direction::<R>(e1) else {
-            return Some(gap);
-        };
+        let [e1, e2, r] = basis;
+        let (_, normal) = direction::<R>(combined(basis, R::cross(e1, e2), self.beyond))?;
+        let (length, along) = direction::<R>(e1)?;
         let (low, high) = (R::from_f64(-MARGIN), R::from_f64(1.0 + MARGIN));
-        let part = R::dot(r, along) / length;
-        let part = if part < low { low } else { part };
-        let part = if part > high { high } else { part };
-        let beyond = residual(normal, [part, R::ZERO]);
-        if beyond > gap.residual {
-            gap = Gap {
-                normal,
-                residual: beyond,
-                shares: [R::ONE, part - R::ONE, -part, R::ZERO],
-            };
+        let part = clamped(R::dot(r, along) / length, low, high);
+        Some(ContactPlane {
+            normal,
+            shares: [R::ONE, part - R::ONE, -part, R::ZERO],
+            is_second: true,
+        })
+    }
+
+    /// Whether the vertex is past the end of the surface.
+    fn is_past(&self, basis: Basis<R>) -> bool {
+        if self.limit == [R::ZERO; 3] {
+            return false;
         }
+        let [e1, e2, r] = basis;
+        let outward = direction::<R>(combined(basis, R::cross(e1, e2), self.limit));
+        let (Some((_, outward)), Some((length, along))) = (outward, direction::<R>(e1)) else {
+            return false;
+        };
+        let part = clamped(R::dot(r, along) / length, R::ZERO, R::ONE);
+        R::dot(outward, r - e1 * part) > self.distance + self.thickness
+    }
+
+    /// The plane between two edges through their closest points, and whether these lie beyond an end of one of them;
+    /// `None` if they are parallel.
+    fn edge_plane(&self, [x0, x1, x2, x3]: [R::Vector; 4]) -> Option<(ContactPlane<R, 4>, bool)> {
+        let (length, along) = direction::<R>(x1 - x0)?;
+        let (other_length, other) = direction::<R>(x3 - x2)?;
+        let across = R::cross(along, other);
+        let square = R::dot(across, across);
+        let are_parallel = square <= R::from_f64(PARALLEL * PARALLEL);
+        if are_parallel || !square.is_finite() {
+            return None;
+        }
+        let r = x0 - x2;
+        let first = -(R::dot(r, R::cross(other, across)) / square) / length;
+        let second = -(R::dot(r, R::cross(along, across)) / square) / other_length;
+        if !(first.is_finite() && second.is_finite()) {
+            return None;
+        }
+        let on_edge = |part: R| part >= R::ZERO && part <= R::ONE;
+        let is_past = !(on_edge(first) && on_edge(second));
+        let [first, second] = [first, second].map(|part| clamped(part, R::ZERO, R::ONE));
+        let [x, y, z] = self.beyond;
+        let plane = ContactPlane {
+            normal: R::vector(x, y, z),
+            shares: [R::ONE - first, first, second - R::ONE, -second],
+            is_second: false,
+        };
+        Some((plane, is_past))
+    }
+
+    fn edge_gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
+        let (plane, is_past) = self.edge_plane(x)?;
+        let [_, first, _, second] = plane.shares;
+        let between = |x: [R::Vector; 4]| {
+            let way = (x[0] - x[2]) + (x[1] - x[0]) * first + (x[3] - x[2]) * second;
+            R::dot(plane.normal, way) - self.thickness
+        };
+        Some(Gap {
+            plane,
+            residual: new_part(between(x), between(previous), kept),
+            is_past,
+        })
+    }
+
+    /// The distance of the vertex from a plane, less the thickness.
+    #[inline]
+    fn above(&self, plane: &ContactPlane<R, 4>, [e1, e2, r]: Basis<R>) -> R {
+        let [_, _, second, third] = plane.shares;
+        R::dot(plane.normal, r + e1 * second + e2 * third) - self.thickness
+    }
+}
+
+impl<R: Float> Contact<R, 4> for Surface<R> {
+    fn particles(&self) -> [u32; 4] {
+        self.particles
+    }
+
+    #[inline]
+    fn gap(&self, x: [R::Vector; 4], previous: [R::Vector; 4], kept: R) -> Option<Gap<R, 4>> {
+        if self.is_edges {
+            return self.edge_gap(x, previous, kept);
+        }
+        let (now, old) = (basis::<R>(x), basis::<R>(previous));
+        let at = |plane: ContactPlane<R, 4>| Gap {
+            residual: new_part(self.above(&plane, now), self.above(&plane, old), kept),
+            plane,
+            is_past: false,
+        };
+        let gap = at(self.own_plane(now)?);
+        if gap.is_open() {
+            return Some(gap);
+        }
+        let beyond = self.plane_beyond(now).map(at);
+        let mut gap = match beyond {
+            Some(beyond) if beyond.residual > gap.residual => beyond,
+            _ => gap,
+        };
+        gap.is_past = !gap.is_open() && self.is_past(now);
         Some(gap)
     }
 
-    fn faces(&self, x: [R::Vector; 4]) -> bool {
-        let (e1, e2, r) = (x[2] - x[1], x[3] - x[1], x[0] - x[1]);
+    #[inline]
+    fn plane(&self, x: [R::Vector; 4], is_second: bool) -> Option<ContactPlane<R, 4>> {
+        if self.is_edges {
+            return self.edge_plane(x).map(|(plane, _)| plane);
+        }
+        let basis = basis::<R>(x);
+        if is_second {
+            self.plane_beyond(basis)
+        } else {
+            self.own_plane(basis)
+        }
+    }
+
+    fn is_opposite(&self, x: [R::Vector; 4]) -> bool {
+        if self.is_edges {
+            return true;
+        }
+        let [e1, e2, r] = basis::<R>(x);
         let Some((size, normal)) = direction::<R>(R::cross(e1, e2)) else {
             return false;
         };
@@ -329,8 +579,9 @@ fn new_part<R: Float>(value: R, before: R, kept: R) -> R {
     }
 }
 
-/// The weights of the second and the third corner of a triangle that has been grown by [`MARGIN`], for those of a point
-/// in its plane; `None` for what is no number.
+/// The weights of the second and the third corner for those of a point in the plane of a triangle: unchanged inside of the
+/// triangle with its sides moved outward by [`MARGIN`] altitudes, otherwise of a point on those sides. `None` for what is
+/// no number.
 #[inline]
 fn inside<R: Float>(second: R, third: R) -> Option<[R; 2]> {
     let margin = R::from_f64(MARGIN);
@@ -341,7 +592,7 @@ fn inside<R: Float>(second: R, third: R) -> Option<[R; 2]> {
     if weights.iter().all(|w| *w >= -margin) {
         return Some([second, third]);
     }
-    // Measured from the grown sides, what lies beyond a side goes onto it.
+    // Weights measured from the grown sides: what lies beyond a side goes onto it, the others keep their ratio.
     let [a, b, c] = weights.map(|w| if w > -margin { w + margin } else { R::ZERO });
     let scale = (R::ONE + margin + margin + margin) / (a + b + c);
     Some([b * scale - margin, c * scale - margin])
@@ -367,7 +618,7 @@ pub(crate) struct Contacts<R: Float> {
     law: Option<ContactLaw>,
     /// In solving order.
     pairs: Vec<Pair<R>>,
-    faces: Vec<Face<R>>,
+    surfaces: Vec<Surface<R>>,
     rounds: Vec<Round>,
     /// Of each kind.
     colors: [usize; 2],
@@ -391,7 +642,7 @@ impl<R: Float> Default for Contacts<R> {
         Self {
             law: None,
             pairs: Vec::new(),
-            faces: Vec::new(),
+            surfaces: Vec::new(),
             rounds: Vec::new(),
             colors: [0; 2],
             taken: Vec::new(),
@@ -408,7 +659,7 @@ impl<R: Float> Clone for Contacts<R> {
         Self {
             law: self.law,
             pairs: self.pairs.clone(),
-            faces: self.faces.clone(),
+            surfaces: self.surfaces.clone(),
             rounds: self.rounds.clone(),
             colors: self.colors,
             ..Self::default()
@@ -462,12 +713,12 @@ impl<R: Float> Contacts<R> {
         self.law.is_some()
     }
 
-    /// Number of pairs and of faces.
+    /// Number of pairs and of contacts between surfaces.
     pub(crate) fn counts(&self) -> [usize; 2] {
-        [self.pairs.len(), self.faces.len()]
+        [self.pairs.len(), self.surfaces.len()]
     }
 
-    /// Number of colors, of pairs and of faces together.
+    /// Number of colors, of pairs and of surfaces together.
     pub(crate) fn color_count(&self) -> usize {
         self.colors.iter().sum()
     }
@@ -483,9 +734,9 @@ impl<R: Float> Contacts<R> {
         particle_count: usize,
         law: &ContactLaw,
         pairs: (&[PairContact], &Coloring),
-        faces: (&[FaceContact], &Coloring),
+        surfaces: (&[SurfaceContact], &Coloring),
     ) -> Result<(), XpbdError> {
-        let result = self.try_set(particle_count, law, pairs, faces);
+        let result = self.try_set(particle_count, law, pairs, surfaces);
         if result.is_err() {
             self.clear();
         }
@@ -497,13 +748,13 @@ impl<R: Float> Contacts<R> {
         particle_count: usize,
         law: &ContactLaw,
         pairs: (&[PairContact], &Coloring),
-        faces: (&[FaceContact], &Coloring),
+        surfaces: (&[SurfaceContact], &Coloring),
     ) -> Result<(), XpbdError> {
         law.check()?;
         self.law = Some(*law);
         let lists = [
             (pairs.0.len(), pairs.1.vertex_count()),
-            (faces.0.len(), faces.1.vertex_count()),
+            (surfaces.0.len(), surfaces.1.vertex_count()),
         ];
         for (expected, found) in lists {
             if expected != found {
@@ -518,17 +769,30 @@ impl<R: Float> Contacts<R> {
         self.taken.resize(particle_count, 0);
         let taken = &mut self.taken;
         take_colors(taken, pairs.0, |c| c.particles, pairs.1, 0)?;
-        take_colors(taken, faces.0, |c| c.particles, faces.1, PARALLEL_COLORS)?;
+        take_colors(
+            taken,
+            surfaces.0,
+            SurfaceContact::particles,
+            surfaces.1,
+            PARALLEL_COLORS,
+        )?;
         let Self {
             rounds,
             pairs: own_pairs,
-            faces: own_faces,
+            surfaces: own_surfaces,
             ..
         } = self;
         rounds.clear();
         arrange(pairs.0, pairs.1, Pair::new, own_pairs, rounds, true)?;
-        arrange(faces.0, faces.1, Face::new, own_faces, rounds, false)?;
-        self.colors = [pairs.1.color_count(), faces.1.color_count()];
+        arrange(
+            surfaces.0,
+            surfaces.1,
+            Surface::new,
+            own_surfaces,
+            rounds,
+            false,
+        )?;
+        self.colors = [pairs.1.color_count(), surfaces.1.color_count()];
         // Those of the frame before belong to other contacts.
         self.impulses.clear();
         Ok(())
@@ -536,22 +800,27 @@ impl<R: Float> Contacts<R> {
 
     /// All contacts as plain numbers, in solving order.
     pub(crate) fn data(&self) -> impl Iterator<Item = ContactData<R>> + '_ {
-        let none = u32::MAX;
+        let (none, o) = (u32::MAX, R::ZERO);
         let pairs = self.pairs.iter().map(move |pair| {
             let ([a, b], [x, y, z]) = (pair.particles, R::components(pair.normal));
             ContactData {
                 particles: [a, b, none, none],
-                numbers: [x, y, z, R::ZERO],
+                numbers: [x, y, z, o, o, o, o, o],
             }
         });
-        let faces = self.faces.iter().map(|face| {
-            let [a, b, c] = face.beyond;
+        let surfaces = self.surfaces.iter().map(|surface| {
+            let ([a, b, c], [d, e, f]) = (surface.beyond, surface.limit);
+            let last = if surface.is_edges {
+                -R::ONE
+            } else {
+                surface.distance
+            };
             ContactData {
-                particles: face.particles,
-                numbers: [a, b, c, face.thickness],
+                particles: surface.particles,
+                numbers: [a, b, c, surface.thickness, d, e, f, last],
             }
         });
-        pairs.chain(faces)
+        pairs.chain(surfaces)
     }
 
     /// The rounds of the solving order.
@@ -580,7 +849,7 @@ impl<R: Float> Contacts<R> {
 
     /// Takes the impulses of a frame or a part that was computed elsewhere.
     pub(crate) fn load(&mut self, impulses: &[[R; 4]], settings: &StepSettings) {
-        assert_eq!(impulses.len(), self.pairs.len() + self.faces.len());
+        assert_eq!(impulses.len(), self.pairs.len() + self.surfaces.len());
         self.impulses.clear();
         self.impulses
             .extend(impulses.iter().copied().map(R::particle));
@@ -597,11 +866,23 @@ impl<R: Float> Contacts<R> {
             self.state(particles, i, pair, [b, a])
         });
         let first = self.pairs.len();
-        let faces = self.faces.iter().enumerate().map(move |(i, face)| {
-            let [vertex, corner, ..] = face.particles;
-            self.state(particles, first + i, face, [vertex, corner])
+        let surfaces = self.surfaces.iter().enumerate().map(move |(i, surface)| {
+            let [vertex, corner, end, _] = surface.particles;
+            let against = if surface.is_edges { end } else { corner };
+            let mut state = self.state(particles, first + i, surface, [vertex, against]);
+            let x = surface.particles.map(|p| particles.vector(p as usize));
+            if let Some((plane, is_past)) = surface.edge_plane(x).filter(|_| surface.is_edges) {
+                let [_, first, _, second] = plane.shares;
+                let end = particles.position(corner as usize);
+                state.point = state.point.lerp(end, first.to_f64());
+                if is_past {
+                    let way = (x[0] - x[2]) + (x[1] - x[0]) * first + (x[3] - x[2]) * second;
+                    state.depth = state.depth.min(-R::to_dvec3(way).length());
+                }
+            }
+            state
         });
-        pairs.chain(faces)
+        pairs.chain(surfaces)
     }
 
     fn state<const K: usize>(
@@ -615,7 +896,7 @@ impl<R: Float> Contacts<R> {
         let gap = contact.gap(x, x, R::ZERO);
         let mut depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
         // Below the plane of a triangle but beside the triangle, a vertex is not inside.
-        if !contact.faces(x) {
+        if gap.is_some_and(|gap| gap.is_past) || !contact.is_opposite(x) {
             depth = depth.min(0.0);
         }
         let [x, y, z, normal] = self
@@ -626,6 +907,7 @@ impl<R: Float> Contacts<R> {
         ContactState {
             vertex,
             against,
+            point: particles.position(vertex as usize),
             depth,
             pressure: normal,
             force: DVec3::new(x, y, z),
@@ -642,24 +924,56 @@ impl<R: Float> Contacts<R> {
     ) {
         let numbers = contact.particles();
         let cells = numbers.map(|p| &particles.cells[p as usize]);
-        let x = cells.map(|cell| load::<R>(cell));
+        let mut x = cells.map(|cell| load::<R>(cell));
         let previous = numbers.map(|p| particles.previous[p as usize]);
-        let Some(gap) = contact.gap(x, previous, factors.kept) else {
+        let Some(mut gap) = contact.gap(x, previous, factors.kept) else {
             return;
         };
-        let residual = gap.residual;
         let multiplier = self.multipliers.get(index);
-        let [hx, hy, hz, before] = multiplier.map_or([R::ZERO; 4], R::read);
+        let [hx, hy, hz, signed] = multiplier.map_or([R::ZERO; 4], R::read);
+        let was_second = signed < R::ZERO;
+        let mut before = if was_second { -signed } else { signed };
+        let mut friction = R::vector(hx, hy, hz);
+        let has_pressed = before > R::ZERO;
         // Open, and no impulse to take back.
-        if !(residual < R::ZERO || before > R::ZERO) {
+        if gap.is_open() && !has_pressed {
+            return;
+        }
+        if !gap.residual.is_finite() {
             return;
         }
         let weights = cells.map(|cell| weight::<R>(cell));
+        if has_pressed && (gap.is_past || gap.plane.is_second != was_second) {
+            // What pressed along another plane, or on a surface that has ended, is taken back where it acted.
+            let Some(plane) = contact.plane(x, was_second) else {
+                return;
+            };
+            let impulse = -(plane.normal * before + friction);
+            if !self.push(
+                index,
+                numbers,
+                &mut x,
+                particles,
+                plane.shares,
+                (impulse, -before),
+            ) {
+                return;
+            }
+            (before, friction) = (R::ZERO, R::Vector::default());
+            if let Some(multiplier) = multiplier {
+                R::write(multiplier, [R::ZERO; 4]);
+            }
+            match contact.gap(x, previous, factors.kept) {
+                Some(now) if !now.is_open() => gap = now,
+                _ => return,
+            }
+        }
+        let plane = gap.plane;
         let mut sum = R::ZERO;
-        for (&weight, &share) in weights.iter().zip(&gap.shares) {
+        for (&weight, &share) in weights.iter().zip(&plane.shares) {
             sum += weight * share * share;
         }
-        let mut change = -(residual / sum);
+        let mut change = -(gap.residual / sum);
         if before + change < R::ZERO {
             change = -before;
         }
@@ -668,14 +982,13 @@ impl<R: Float> Contacts<R> {
             return;
         }
         let pressure = before + change;
-        let mut impulse = gap.normal * change;
-        let mut friction = R::vector(hx, hy, hz);
+        let mut impulse = plane.normal * change;
         if factors.friction > R::ZERO {
             let mut slide = R::Vector::default();
             for k in 0..K {
-                slide += (x[k] - previous[k]) * gap.shares[k];
+                slide += (x[k] - previous[k]) * plane.shares[k];
             }
-            slide = slide - gap.normal * R::dot(gap.normal, slide);
+            slide = slide - plane.normal * R::dot(plane.normal, slide);
             let mut wanted = friction - slide * (R::ONE / sum);
             let (length, limit) = (R::dot(wanted, wanted).sqrt(), factors.friction * pressure);
             if length > limit {
@@ -684,26 +997,54 @@ impl<R: Float> Contacts<R> {
             impulse += wanted - friction;
             friction = wanted;
         }
-        if !R::components(impulse).into_iter().all(R::is_finite) {
+        if !self.push(
+            index,
+            numbers,
+            &mut x,
+            particles,
+            plane.shares,
+            (impulse, change),
+        ) {
             return;
-        }
-        for k in 0..K {
-            store::<R>(cells[k], x[k] + impulse * (weights[k] * gap.shares[k]));
-        }
-        if particles.keeps_refused() {
-            for (&particle, &share) in numbers.iter().zip(&gap.shares) {
-                particles.refuse(particle, impulse * share);
-            }
         }
         if let Some(multiplier) = multiplier {
             let [x, y, z] = R::components(friction);
-            R::write(multiplier, [x, y, z, pressure]);
+            // Its sign tells the plane.
+            let signed = if plane.is_second { -pressure } else { pressure };
+            R::write(multiplier, [x, y, z, signed]);
+        }
+    }
+
+    /// Moves the particles of a contact by an impulse along a plane and adds it up, unless it is out of range.
+    #[inline]
+    fn push<const K: usize>(
+        &self,
+        index: usize,
+        numbers: [u32; K],
+        x: &mut [R::Vector; K],
+        particles: &Particles<R>,
+        shares: [R; K],
+        (impulse, change): (R::Vector, R),
+    ) -> bool {
+        if !R::components(impulse).into_iter().all(R::is_finite) {
+            return false;
+        }
+        for k in 0..K {
+            let cell = &particles.cells[numbers[k] as usize];
+            x[k] += impulse * (weight::<R>(cell) * shares[k]);
+            store::<R>(cell, x[k]);
+        }
+        if particles.keeps_refused() {
+            for (&particle, &share) in numbers.iter().zip(&shares) {
+                particles.refuse(particle, impulse * share);
+            }
         }
         if let Some(total) = self.impulses.get(index) {
             let [x, y, z, normal] = R::read(total);
             let [dx, dy, dz] = R::components(impulse);
             R::write(total, [x + dx, y + dy, z + dz, normal + change]);
         }
+        true
     }
 }
 
@@ -777,7 +1118,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
         if self.law.is_none() {
             return 0;
         }
-        let count = self.pairs.len() + self.faces.len();
+        let count = self.pairs.len() + self.surfaces.len();
         let nothing = || R::particle([R::ZERO; 4]);
         // Those of a part of a frame are forgotten when contacts are set.
         if substep.number == 0 || self.impulses.len() != count {
@@ -805,7 +1146,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
             let most = if round.is_tail { 1 } else { threads };
             ((round.to - round.from) / CONTACTS_A_THREAD).clamp(1, most)
         };
-        let first_face = this.pairs.len();
+        let first_surface = this.pairs.len();
         let work = |number: usize, chunk: usize| {
             let (round, chunks) = (this.rounds[number], chunks(number));
             let share = |part: usize| round.from + (round.to - round.from) * part / chunks;
@@ -816,8 +1157,8 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
                 }
             } else {
                 for index in range {
-                    let face = &this.faces[index];
-                    this.solve_one(first_face + index, face, particles, factors);
+                    let surface = &this.surfaces[index];
+                    this.solve_one(first_surface + index, surface, particles, factors);
                 }
             }
         };
@@ -834,6 +1175,6 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&*self.pairs) + size_of_val(&*self.faces) + size_of_val(&*self.rounds)
+        size_of_val(&*self.pairs) + size_of_val(&*self.surfaces) + size_of_val(&*self.rounds)
     }
 }

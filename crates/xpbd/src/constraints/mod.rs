@@ -23,7 +23,8 @@ pub use blades::SolidBlade;
 pub(crate) use colliders::{Colliders, Obstacle, outside};
 pub(crate) use contacts::Contacts;
 pub use contacts::{
-    ContactData, ContactFactors, ContactLaw, ContactRound, ContactState, FaceContact, PairContact,
+    ContactData, ContactFactors, ContactLaw, ContactRound, ContactState, EdgeContact, FaceContact,
+    FaceLimit, PairContact, SurfaceContact,
 };
 pub(crate) use distances::{Distance, Distances};
 pub use distances::{DistanceConstraint, DistanceData};

@@ -6,8 +6,8 @@ use super::Solver;
 use crate::constraints::{Distance, Distances, TetVolume, Volumes};
 use crate::{
     AttachmentData, ContactData, ContactFactors, ContactLaw, ContactRound, ContactState,
-    DistanceConstraint, DistanceData, FaceContact, Float, PairContact, Pose, SolidBlade,
-    StepSettings, VolumeConstraint, VolumeData, XpbdError,
+    DistanceConstraint, DistanceData, Float, PairContact, Pose, SolidBlade, StepSettings,
+    SurfaceContact, VolumeConstraint, VolumeData, XpbdError,
 };
 
 impl<R: Float> Solver<R> {
@@ -332,10 +332,11 @@ impl<R: Float> Solver<R> {
         self.constraints.volumes.schedule()
     }
 
-    /// Replaces all contacts: `pairs` of particles that were one before a cut, and vertices against triangles, `faces`.
+    /// Replaces all contacts: `pairs` of particles that were one before a cut, and those between `surfaces`, of vertices with
+    /// triangles and of edges with edges.
     /// Each list comes with a color for each of its contacts; contacts of one color share no particle, except for colors
     /// from 16 on, which one thread solves together. They are solved after all other constraints but the colliders,
-    /// pairs before faces; [`StepSettings::relaxation`](crate::StepSettings) does not scale them. Only
+    /// pairs before surfaces; [`StepSettings::relaxation`](crate::StepSettings) does not scale them. Only
     /// [`Method::GaussSeidel`](crate::Method) solves contacts: a step by another method is an error from now on, until
     /// [`Solver::clear_contacts`].
     ///
@@ -359,12 +360,12 @@ impl<R: Float> Solver<R> {
     /// let at = [dvec3(0.2, 0.2, 0.1), DVec3::ZERO, DVec3::X, DVec3::Y];
     /// let mut solver = Solver::<f64>::new(&at);
     /// solver.set_mass(0, 2.0); // the corners have none and stay
-    /// let contact = FaceContact { particles: [0, 1, 2, 3], beyond: None, thickness: 0.0 };
+    /// let contact = FaceContact { particles: [0, 1, 2, 3], beyond: None, limit: None, thickness: 0.0 };
     /// let law = ContactLaw { friction: 0.3, recovery_time: 0.02 };
     /// let (none, one) = (Coloring::new(vec![]), Coloring::new(vec![ColorId(0)]));
     /// let settings = StepSettings { substeps: 10, gravity: Some(DVec3::NEG_Z * 9.81), ..StepSettings::new(0.016) };
     /// for _ in 0..60 {
-    ///     solver.set_contacts(&law, (&[], &none), (&[contact], &one))?;
+    ///     solver.set_contacts(&law, (&[], &none), (&[contact.into()], &one))?;
     ///     solver.step(&Schedule::default(), &settings)?;
     /// }
     /// let lying = solver.contacts().next().expect("a contact");
@@ -376,11 +377,11 @@ impl<R: Float> Solver<R> {
         &mut self,
         law: &ContactLaw,
         pairs: (&[PairContact], &Coloring),
-        faces: (&[FaceContact], &Coloring),
+        surfaces: (&[SurfaceContact], &Coloring),
     ) -> Result<(), XpbdError> {
         let count = self.particle_count();
         self.note(|changes| changes.contacts = true);
-        self.constraints.contacts.set(count, law, pairs, faces)
+        self.constraints.contacts.set(count, law, pairs, surfaces)
     }
 
     /// Removes all contacts and their memory; any method may step again.
@@ -420,13 +421,13 @@ impl<R: Float> Solver<R> {
         self.constraints.contacts.is_declared()
     }
 
-    /// Returns the number of pairs and the number of faces.
+    /// Returns the number of pairs and that of contacts between surfaces.
     #[must_use]
     pub fn contact_counts(&self) -> [usize; 2] {
         self.constraints.contacts.counts()
     }
 
-    /// Returns the number of colors of pairs and faces together.
+    /// Returns the number of colors of pairs and surfaces together.
     #[must_use]
     pub fn contact_color_count(&self) -> usize {
         self.constraints.contacts.color_count()

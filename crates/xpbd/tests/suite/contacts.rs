@@ -4,8 +4,8 @@ use glam::{DQuat, DVec3, dvec3};
 use incise_coloring::{Order, greedy};
 use incise_graph::{ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{
-    ContactLaw, FaceContact, Method, PairContact, Real, Solver, StepSettings, VbdSettings,
-    VertexStars, XpbdError,
+    ContactLaw, EdgeContact, FaceContact, FaceLimit, Method, PairContact, Real, Solver,
+    StepSettings, SurfaceContact, VbdSettings, VertexStars, XpbdError,
 };
 use proptest::prelude::*;
 
@@ -17,12 +17,27 @@ const SMOOTH: ContactLaw = ContactLaw {
     recovery_time: 0.02,
 };
 
+const NO_FACES: [FaceContact; 0] = [];
+
 fn face(particles: [u32; 4]) -> FaceContact {
     FaceContact {
         particles,
         beyond: None,
+        limit: None,
         thickness: 0.0,
     }
+}
+
+fn edges(particles: [u32; 4], normal: DVec3) -> EdgeContact {
+    EdgeContact {
+        particles,
+        normal,
+        thickness: 0.0,
+    }
+}
+
+fn surfaces(contacts: &[impl Copy + Into<SurfaceContact>]) -> Vec<SurfaceContact> {
+    contacts.iter().map(|&contact| contact.into()).collect()
 }
 
 fn pair(particles: [u32; 2], normal: DVec3) -> PairContact {
@@ -39,11 +54,12 @@ fn set<R: Real>(
     solver: &mut Solver<R>,
     law: &ContactLaw,
     pairs: &[PairContact],
-    faces: &[FaceContact],
+    faces: &[impl Copy + Into<SurfaceContact>],
 ) {
     let count = solver.particle_count();
+    let faces = &surfaces(faces)[..];
     let of_pairs: Vec<[u32; 2]> = pairs.iter().map(|c| c.particles).collect();
-    let of_faces: Vec<[u32; 4]> = faces.iter().map(|c| c.particles).collect();
+    let of_faces: Vec<[u32; 4]> = faces.iter().map(SurfaceContact::particles).collect();
     let (of_pairs, of_faces) = (colors(count, &of_pairs), colors(count, &of_faces));
     solver
         .set_contacts(law, (pairs, &of_pairs), (faces, &of_faces))
@@ -82,7 +98,12 @@ fn a_pair_meets_without_bouncing() {
         solver.set_velocity(0, dvec3(0.5, 0.0, 1.0));
         solver.set_velocity(1, dvec3(0.0, -0.25, -1.0));
         let before = momentum(&solver);
-        set(&mut solver, &SMOOTH, &[pair([0, 1], DVec3::Z * 7.0)], &[]);
+        set(
+            &mut solver,
+            &SMOOTH,
+            &[pair([0, 1], DVec3::Z * 7.0)],
+            &NO_FACES,
+        );
         let settings = StepSettings {
             substeps: 4,
             ..StepSettings::new(0.01)
@@ -234,7 +255,7 @@ fn an_overlap_parts_at_its_depth_over_the_recovery_time() {
             recovery_time,
             ..SMOOTH
         };
-        set(&mut solver, &law, &[pair([0, 1], DVec3::Z)], &[]);
+        set(&mut solver, &law, &[pair([0, 1], DVec3::Z)], &NO_FACES);
         let settings = StepSettings {
             substeps,
             ..StepSettings::new(0.01)
@@ -258,7 +279,7 @@ fn an_overlap_parts_at_its_depth_over_the_recovery_time() {
         recovery_time: 0.0,
         ..SMOOTH
     };
-    set(&mut solver, &law, &[pair([0, 1], DVec3::Z)], &[]);
+    set(&mut solver, &law, &[pair([0, 1], DVec3::Z)], &NO_FACES);
     step(&mut solver, &StepSettings::new(1e-3));
     within(
         "depth",
@@ -409,6 +430,220 @@ fn a_vertex_on_an_edge_presses_on_the_edge() {
     }
 }
 
+/// A vertex below the plane of a triangle is held up to the limit and not past it, whatever the plane says.
+#[test]
+fn past_its_limit_a_contact_is_open() {
+    // The edge from the first corner to the second is the x axis, the surface ends towards -y.
+    let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
+    let limit = FaceLimit {
+        normal: [0.0, -1.0, 0.0],
+        distance: 0.25,
+    };
+    for (y, limit, held) in [
+        (-0.2, Some(limit), true),
+        (
+            -0.2,
+            Some(FaceLimit {
+                distance: 0.0,
+                ..limit
+            }),
+            false,
+        ),
+        (-0.3, Some(limit), false),
+        (-0.3, None, true),
+        (
+            0.3,
+            Some(FaceLimit {
+                distance: 0.0,
+                ..limit
+            }),
+            true,
+        ),
+    ] {
+        let at = [dvec3(0.3, y, 0.01), corners[0], corners[1], corners[2]];
+        for iterations in [1, 3] {
+            let mut solver = Solver::<f64>::new(&at);
+            solver.set_mass(0, 1.0);
+            let contact = FaceContact {
+                limit,
+                ..face([0, 1, 2, 3])
+            };
+            set(&mut solver, &SMOOTH, &[], &[contact]);
+            let settings = StepSettings {
+                substeps: 10,
+                iterations,
+                gravity: Some(GRAVITY),
+                ..StepSettings::new(0.016)
+            };
+            for _ in 0..20 {
+                step(&mut solver, &settings);
+            }
+            let z = solver.position(0).z;
+            assert_eq!(z.abs() < 1e-12, held, "{z} at {y} with {limit:?}");
+            let state = solver.contacts().next().unwrap();
+            assert_eq!(state.pressure > 0.0, held);
+            assert!(state.depth <= 1e-12, "past the limit nothing overlaps");
+        }
+    }
+}
+
+/// Two free edges that cross fly at each other: they stop, momentum and angular momentum stay, and the force acts where
+/// they are closest.
+#[test]
+fn two_edges_meet_and_keep_momentum() {
+    let at = [
+        dvec3(-0.5, 0.1, 0.01),
+        dvec3(1.0, 0.1, 0.01),
+        dvec3(0.2, -1.0, 0.0),
+        dvec3(0.2, 0.5, 0.0),
+    ];
+    let mut solver = Solver::<f64>::new(&at);
+    (0..4).for_each(|p| solver.set_mass(p, 1.0 + p as f64));
+    (0..2).for_each(|p| solver.set_velocity(p, dvec3(0.3, 0.0, -1.0)));
+    set(&mut solver, &SMOOTH, &[], &[edges([0, 1, 2, 3], DVec3::Z)]);
+    let before = (momentum(&solver), angular_momentum(&solver));
+    let settings = StepSettings {
+        substeps: 8,
+        ..StepSettings::new(0.016)
+    };
+    for _ in 0..3 {
+        step(&mut solver, &settings);
+    }
+    within("momentum", momentum(&solver).distance(before.0), 1e-12);
+    let turned = angular_momentum(&solver).distance(before.1);
+    // The normal is the given one, while the edges turn on after they have met.
+    within("angular momentum", turned, 2e-3 * before.1.length());
+    let contact = solver.contacts().next().unwrap();
+    within("depth", contact.depth, 1e-12);
+    assert_eq!((contact.vertex, contact.against), (0, 2));
+    let [a, b] = [0, 1].map(|p| solver.position(p));
+    let line = (b - a).normalize();
+    let off = (contact.point - a).reject_from(line).length();
+    within("point", off, 1e-12);
+    assert!(contact.point.x > a.x && contact.point.x < b.x);
+}
+
+/// Edges touch between their ends only, on the side of their normal, and not if they are parallel, have no length or lie
+/// in each other exactly.
+#[test]
+fn what_edges_do_not_touch() {
+    let first = [dvec3(-1.0, 0.0, 0.0), dvec3(1.0, 0.0, 0.0)];
+    let depth = 1e-3;
+    let cases = [
+        (
+            "crossing",
+            [dvec3(0.2, -1.0, depth), dvec3(0.2, 1.0, depth)],
+            true,
+        ),
+        (
+            "at an end",
+            [dvec3(1.0, 0.0, depth), dvec3(1.0, 1.0, depth)],
+            true,
+        ),
+        (
+            "past an end",
+            [dvec3(1.01, -1.0, depth), dvec3(1.01, 1.0, depth)],
+            false,
+        ),
+        (
+            "before its own",
+            [dvec3(0.0, 0.1, depth), dvec3(0.0, 1.0, depth)],
+            false,
+        ),
+        (
+            "apart",
+            [dvec3(0.2, -1.0, -depth), dvec3(0.2, 1.0, -depth)],
+            false,
+        ),
+        (
+            "exactly touching",
+            [dvec3(0.2, -1.0, 0.0), dvec3(0.2, 1.0, 0.0)],
+            false,
+        ),
+        (
+            "parallel",
+            [dvec3(-1.0, 0.0, depth), dvec3(1.0, 0.0, depth)],
+            false,
+        ),
+        (
+            "nearly parallel",
+            [dvec3(-1.0, -0.004, depth), dvec3(1.0, 0.004, depth)],
+            false,
+        ),
+        (
+            "a point",
+            [dvec3(0.2, 0.0, depth), dvec3(0.2, 0.0, depth)],
+            false,
+        ),
+    ];
+    for (name, second, touches) in cases {
+        for iterations in [1, 3] {
+            let at = [first[0], first[1], second[0], second[1]];
+            let mut solver = Solver::<f64>::new(&at);
+            (0..4).for_each(|p| solver.set_mass(p, 1.0));
+            let law = ContactLaw {
+                friction: 0.5,
+                recovery_time: 0.0,
+            };
+            set(&mut solver, &law, &[], &[edges([0, 1, 2, 3], DVec3::Z)]);
+            let settings = StepSettings {
+                iterations,
+                ..StepSettings::new(1e-3)
+            };
+            step(&mut solver, &settings);
+            let moved = (0..4).any(|p| solver.position(p) != at[p]);
+            assert_eq!(moved, touches, "{name}");
+            let contact = solver.contacts().next().unwrap();
+            assert_eq!(contact.pressure > 0.0, touches, "{name}");
+            assert!(contact.depth < 1e-12, "{name}: {}", contact.depth);
+        }
+    }
+}
+
+/// What a contact pressed along one plane is taken back along that plane, also if another contact has moved the vertex
+/// to where the other plane is the nearer one: the sum of what acted is nothing.
+#[test]
+fn an_impulse_is_taken_back_where_it_acted() {
+    // A front that faces x with a bottom that faces -z, and a plate that drives the vertex down and against the front.
+    let at = [
+        dvec3(-0.01, 0.1, 0.02),
+        DVec3::NEG_Y,
+        DVec3::Y,
+        DVec3::Z,
+        dvec3(-3.0, -3.0, 0.25),
+        dvec3(0.0, 3.0, -0.05),
+        dvec3(3.0, -3.0, -0.35),
+    ];
+    let [a, b, c] = [at[4], at[5], at[6]];
+    assert!((b - a).cross(c - a).z < 0.0);
+    let contacts = [
+        FaceContact {
+            beyond: Some([0.5, -1.0, 0.0]),
+            ..face([0, 1, 2, 3])
+        },
+        face([0, 4, 5, 6]),
+    ];
+    for friction in [0.0, 0.4] {
+        let law = ContactLaw {
+            friction,
+            recovery_time: 0.0,
+        };
+        let mut solver = Solver::<f64>::new(&at);
+        solver.set_mass(0, 1.0);
+        set(&mut solver, &law, &[], &contacts);
+        let settings = StepSettings {
+            iterations: 6,
+            ..StepSettings::new(1e-3)
+        };
+        step(&mut solver, &settings);
+        let states: Vec<_> = solver.contacts().collect();
+        assert_eq!(states[0].pressure, 0.0, "below the block it is free");
+        let first = states[0].force.length();
+        assert!(first < 1e-9 * states[1].pressure, "{first} N are left");
+        assert!(states[1].pressure > 0.0 && solver.position(0).z < 0.0);
+    }
+}
+
 /// Exactly closed contacts and those that open write nothing: every bit is that of a run without contacts. Vertices
 /// are on a corner, an edge and a face of dyadic coordinates, and all move on together.
 fn closed_contacts_are_silent<R: Real>() {
@@ -549,7 +784,7 @@ fn a_frame_asks_for_no_memory() {
             ..StepSettings::new(2e-3)
         };
         let frame = |solver: &mut Solver<f32>| {
-            let set = solver.set_contacts(&SMOOTH, (&pairs, &one), (&faces, &one));
+            let set = solver.set_contacts(&SMOOTH, (&pairs, &one), (&faces.map(Into::into), &one));
             set.unwrap();
             solver.step(&Schedule::default(), &settings).unwrap();
         };
@@ -588,7 +823,7 @@ fn clones_continue_and_cleared_contacts_are_gone() {
 fn methods_without_contacts_are_refused_by_name() {
     let mut solver = Solver::<f64>::new(&[DVec3::ZERO, DVec3::Z]);
     (0..2).for_each(|p| solver.set_mass(p, 1.0));
-    set(&mut solver, &SMOOTH, &[], &[]);
+    set(&mut solver, &SMOOTH, &[], &NO_FACES);
     let chebyshev = Method::Chebyshev {
         spectral_radius: 0.9,
         chebyshev_start: 2,
@@ -643,23 +878,42 @@ fn bad_contacts_and_foreign_colors_are_refused() {
                 },
                 "thickness",
             ),
+            (
+                SMOOTH,
+                FaceContact {
+                    limit: Some(FaceLimit {
+                        normal: [0.0, -1.0, 0.0],
+                        distance: bad,
+                    }),
+                    ..good
+                },
+                "limit distance",
+            ),
         ] {
-            let set = solver.set_contacts(&law, (&[], &none), (&[contact], &zeros(1)));
+            let set = solver.set_contacts(&law, (&[], &none), (&[contact.into()], &zeros(1)));
             let error = set.unwrap_err().to_string();
             assert!(error.contains(name), "{error}");
             assert!(!solver.has_contacts());
         }
     }
     for normal in [[0.0; 3], [f64::NAN, 0.0, 1.0]] {
-        let contact = FaceContact {
-            beyond: Some(normal),
-            ..good
+        let limit = FaceLimit {
+            normal,
+            distance: 0.0,
         };
-        assert!(
-            solver
-                .set_contacts(&SMOOTH, (&[], &none), (&[contact], &zeros(1)))
-                .is_err()
-        );
+        for contact in [
+            FaceContact {
+                beyond: Some(normal),
+                ..good
+            },
+            FaceContact {
+                limit: Some(limit),
+                ..good
+            },
+        ] {
+            let set = solver.set_contacts(&SMOOTH, (&[], &none), (&[contact.into()], &zeros(1)));
+            assert!(set.is_err());
+        }
         let contact = pair([0, 1], DVec3::from_array(normal));
         assert!(
             solver
@@ -679,14 +933,18 @@ fn bad_contacts_and_foreign_colors_are_refused() {
             "particle 0 twice",
         ),
     ] {
-        let set = solver.set_contacts(&SMOOTH, (&[], &none), (faces, &colors));
+        let set = solver.set_contacts(&SMOOTH, (&[], &none), (&surfaces(faces), &colors));
         let error = set.unwrap_err().to_string();
         assert!(error.contains(message), "{error}");
     }
     // A pair and a face may share a color and a particle: they are solved one after the other.
     let pairs = [pair([0, 3], DVec3::Z)];
     solver
-        .set_contacts(&SMOOTH, (&pairs, &zeros(1)), (&touching[..1], &zeros(1)))
+        .set_contacts(
+            &SMOOTH,
+            (&pairs, &zeros(1)),
+            (&surfaces(&touching[..1]), &zeros(1)),
+        )
         .unwrap();
 }
 
@@ -702,13 +960,19 @@ mod oracle {
         pub(super) weight: f64,
     }
 
-    /// Particles, the coefficients of the normal beyond an edge or the normal of a pair, a thickness.
+    /// Particles, the coefficients of the normal beyond an edge and of a limit with its distance, zeros for none; or the
+    /// normal of a pair. A thickness.
     #[derive(Clone)]
     pub(super) struct Contact {
         pub(super) particles: Vec<usize>,
         pub(super) normal: Option<V>,
+        pub(super) limit: (V, f64),
         pub(super) of_pair: V,
+        /// Whether the normal is that of two edges.
+        pub(super) is_edges: bool,
         pub(super) thickness: f64,
+        /// The plane that the multiplier belongs to.
+        pub(super) plane: usize,
         pub(super) multiplier: f64,
         pub(super) friction: V,
     }
@@ -734,9 +998,22 @@ mod oracle {
         sum
     }
 
+    /// Where two lines are closest, by the normal equations.
+    fn on_edges(x: &[V]) -> [f64; 2] {
+        let [d, e, r] = [(1, 0), (3, 2), (0, 2)].map(|(a, b)| add(x[a], x[b], -1.0));
+        let (a, b, c) = (dot(d, d), dot(d, e), dot(e, e));
+        let (p, q) = (dot(d, r), dot(e, r));
+        let determinant = a * c - b * b;
+        [(b * q - c * p) / determinant, (a * q - b * p) / determinant]
+    }
+
     /// The shares of the particles and the unit normal of each plane.
     fn planes(contact: &Contact, x: &[V]) -> Vec<(Vec<f64>, V)> {
         let unit = |n: V| n.map(|c| c / dot(n, n).sqrt());
+        if contact.is_edges {
+            let [s, t] = on_edges(x).map(|part| part.clamp(0.0, 1.0));
+            return vec![(vec![1.0 - s, s, t - 1.0, -t], unit(contact.of_pair))];
+        }
         let Some(n) = contact.normal else {
             return vec![(vec![-1.0, 1.0], unit(contact.of_pair))];
         };
@@ -765,32 +1042,77 @@ mod oracle {
         planes
     }
 
+    /// Whether a vertex inside is past the end of the surface.
+    fn is_past(contact: &Contact, x: &[V]) -> bool {
+        if contact.is_edges {
+            return on_edges(x).iter().any(|part| !(0.0..=1.0).contains(part));
+        }
+        let (n, distance) = contact.limit;
+        if contact.normal.is_none() || n == [0.0; 3] {
+            return false;
+        }
+        let [e1, e2, r] = [(2, 1), (3, 1), (0, 1)].map(|(a, b)| add(x[a], x[b], -1.0));
+        let n = add(add(cross(e1, e2).map(|a| a * n[2]), e1, n[0]), e2, n[1]);
+        let n = n.map(|c| c / dot(n, n).sqrt());
+        let t = (dot(e1, r) / dot(e1, e1)).clamp(0.0, 1.0);
+        dot(n, add(r, e1, -t)) > distance + contact.thickness
+    }
+
+    fn push(particles: &mut [Particle], contact: &Contact, shares: &[f64], impulse: V) {
+        for (&p, share) in contact.particles.iter().zip(shares) {
+            particles[p].x = add(particles[p].x, impulse, particles[p].weight * share);
+        }
+    }
+
     pub(super) fn solve(
         particles: &mut [Particle],
         contact: &mut Contact,
         friction: f64,
         kept: f64,
     ) {
-        let x: Vec<V> = contact.particles.iter().map(|&p| particles[p].x).collect();
-        let before: Vec<V> = contact
-            .particles
-            .iter()
-            .map(|&p| particles[p].previous)
-            .collect();
-        let mut best: Option<(f64, Vec<f64>, V)> = None;
-        for (shares, n) in planes(contact, &x) {
-            let now = dot(n, combine(&shares, &x)) - contact.thickness;
-            let old = dot(n, combine(&shares, &before)) - contact.thickness;
-            let residual = now - kept * old.min(0.0);
-            // Outside of the triangle's plane is outside.
-            if best
-                .as_ref()
-                .is_none_or(|best| best.0 < 0.0 && residual > best.0)
-            {
-                best = Some((residual, shares, n));
+        let points = |particles: &[Particle]| -> Vec<V> {
+            contact.particles.iter().map(|&p| particles[p].x).collect()
+        };
+        let x = points(particles);
+        let before = contact.particles.iter().map(|&p| particles[p].previous);
+        let before: Vec<V> = before.collect();
+        // The plane, its residual, shares and normal; none where the contact is open.
+        let chosen = |x: &[V]| {
+            let mut best: Option<(f64, usize)> = None;
+            let planes = planes(contact, x);
+            for (plane, (shares, n)) in planes.iter().enumerate() {
+                let now = dot(*n, combine(shares, x)) - contact.thickness;
+                let old = dot(*n, combine(shares, &before)) - contact.thickness;
+                let residual = now - kept * old.min(0.0);
+                // Outside of the triangle's plane is outside.
+                if best.is_none_or(|best| best.0 < 0.0 && residual > best.0) {
+                    best = Some((residual, plane));
+                }
             }
+            let (residual, plane) = best.expect("one plane at least");
+            (
+                residual,
+                plane,
+                is_past(contact, x) && (residual < 0.0 || contact.is_edges),
+            )
+        };
+        let (mut residual, mut plane, is_past) = chosen(&x);
+        let mut x = x;
+        if contact.multiplier > 0.0 && (is_past || plane != contact.plane) {
+            let (shares, n) = planes(contact, &x).swap_remove(contact.plane);
+            let impulse = add(contact.friction, n, contact.multiplier);
+            push(particles, contact, &shares, impulse.map(|i| -i));
+            x = points(particles);
+            let (now, at, is_past) = chosen(&x);
+            (contact.multiplier, contact.friction) = (0.0, [0.0; 3]);
+            if now >= 0.0 || is_past {
+                return;
+            }
+            (residual, plane) = (now, at);
+        } else if is_past {
+            return;
         }
-        let (residual, shares, n) = best.expect("one plane at least");
+        let (shares, n) = planes(contact, &x).swap_remove(plane);
         let of = |k: usize| particles[contact.particles[k]].weight;
         let w: f64 = shares.iter().enumerate().map(|(k, s)| of(k) * s * s).sum();
         let new = (contact.multiplier - residual / w).max(0.0);
@@ -798,7 +1120,7 @@ mod oracle {
             return;
         }
         let mut impulse = n.map(|n| n * (new - contact.multiplier));
-        contact.multiplier = new;
+        (contact.multiplier, contact.plane) = (new, plane);
         let moved: Vec<V> = x
             .iter()
             .zip(&before)
@@ -815,10 +1137,7 @@ mod oracle {
             impulse = add(add(impulse, wanted, 1.0), contact.friction, -1.0);
             contact.friction = wanted;
         }
-        for (k, share) in shares.iter().enumerate() {
-            let particle = &mut particles[contact.particles[k]];
-            particle.x = add(particle.x, impulse, particle.weight * share);
-        }
+        push(particles, contact, &shares, impulse);
     }
 }
 
@@ -829,7 +1148,7 @@ proptest! {
     #[test]
     fn the_slow_oracle_agrees(
         points in prop::collection::vec((prop::array::uniform3(-1.0..1.0f64), prop::array::uniform3(-1.0..1.0f64), 0.05..5.0f64), 6..14),
-        contacts in prop::collection::vec((prop::array::uniform4(0..14usize), prop::array::uniform3(-0.5..0.5f64), 0..4u8, 0.0..0.05f64), 1..12),
+        contacts in prop::collection::vec((prop::array::uniform4(0..14usize), prop::array::uniform3(-0.5..0.5f64), 0..6u8, 0.0..0.05f64), 1..12),
         friction in 0.0..1.0f64,
         recovery_time in 0.0..0.05f64,
         iterations in 1..4u32,
@@ -863,9 +1182,18 @@ proptest! {
             let small = numbers.map(|p| u32::try_from(p).unwrap());
             if kind == 0 {
                 pairs.push(pair([small[0], small[1]], DVec3::from_array(normal) + DVec3::Z));
+            } else if kind > 3 {
+                let [a, b, c, d] = numbers.map(|p| at[p]);
+                let sine = (b - a).normalize_or_zero().cross((d - c).normalize_or_zero()).length();
+                if sine > 0.2 && a.distance(b).min(c.distance(d)) > 0.2 {
+                    let normal = DVec3::from_array(normal) + DVec3::Z;
+                    faces.push(SurfaceContact::from(EdgeContact { thickness, ..edges(small, normal) }));
+                }
             } else if (b - a).cross(c - a).length() > 0.3 {
                 let beyond = (kind > 1).then_some([normal[0], normal[1] - 1.0, 1.0]);
-                faces.push(FaceContact { beyond, thickness, ..face(small) });
+                let normal = [normal[1], normal[2] - 0.7, normal[0]];
+                let limit = (kind > 2).then_some(FaceLimit { normal, distance: thickness });
+                faces.push(FaceContact { beyond, limit, thickness, ..face(small) }.into());
             }
         }
         let law = ContactLaw { friction, recovery_time };
@@ -874,11 +1202,19 @@ proptest! {
         let settings = StepSettings { substeps, iterations, gravity: Some(GRAVITY), ..StepSettings::new(time) };
         step(&mut solver, &settings);
 
-        type Raw = (Vec<u32>, Option<[f64; 3]>, [f64; 3], f64);
-        let of_pairs = pairs.iter().map(|c| (c.particles.to_vec(), None, c.normal.to_array(), 0.0));
+        type Raw = (Vec<u32>, Option<[f64; 3]>, [f64; 3], f64, ([f64; 3], f64), bool);
+        let no_limit = ([0.0; 3], 0.0);
+        let of_pairs = pairs.iter().map(|c| (c.particles.to_vec(), None, c.normal.to_array(), 0.0, no_limit, false));
         let of_faces = faces.iter().map(|c| {
+            let c = match c {
+                SurfaceContact::Face(c) => c,
+                SurfaceContact::Edges(c) => {
+                    return (c.particles.to_vec(), None, c.normal.to_array(), c.thickness, no_limit, true);
+                }
+            };
             let beyond = Some(c.beyond.unwrap_or_default());
-            (c.particles.to_vec(), beyond, [0.0; 3], c.thickness)
+            let limit = c.limit.map_or(no_limit, |limit| (limit.normal, limit.distance));
+            (c.particles.to_vec(), beyond, [0.0; 3], c.thickness, limit, false)
         });
         let order = |list: Vec<Raw>, colors: &Coloring| {
             let mut order: Vec<usize> = (0..list.len()).collect();
@@ -888,6 +1224,9 @@ proptest! {
                 normal: list[*c].1,
                 of_pair: list[*c].2,
                 thickness: list[*c].3,
+                limit: list[*c].4,
+                is_edges: list[*c].5,
+                plane: 0,
                 multiplier: 0.0,
                 friction: [0.0; 3],
             };
@@ -895,7 +1234,7 @@ proptest! {
         };
         let (of_pairs, of_faces): (Vec<_>, Vec<_>) = (of_pairs.collect(), of_faces.collect());
         let in_pairs: Vec<[u32; 2]> = pairs.iter().map(|c| c.particles).collect();
-        let in_faces: Vec<[u32; 4]> = faces.iter().map(|c| c.particles).collect();
+        let in_faces: Vec<[u32; 4]> = faces.iter().map(SurfaceContact::particles).collect();
         let mut all = order(of_pairs, &colors(count, &in_pairs));
         all.extend(order(of_faces, &colors(count, &in_faces)));
         let dt = time / f64::from(substeps);
@@ -932,7 +1271,7 @@ proptest! {
     #[test]
     fn any_contact_leaves_any_particle_finite(
         points in prop::collection::vec((prop::array::uniform3(-1.0..1.0f64), -45..37i32, -300..300i32), 4..9),
-        contacts in prop::collection::vec((prop::array::uniform4(0..9usize), prop::array::uniform3(-1.0..1.0f64), -40..37i32, 0..4u8), 1..10),
+        contacts in prop::collection::vec((prop::array::uniform4(0..9usize), prop::array::uniform3(-1.0..1.0f64), -40..37i32, 0..5u8), 1..10),
         friction in 0.0..2.0f64,
         iterations in 1..4u32,
     ) {
@@ -956,7 +1295,12 @@ proptest! {
             } else {
                 let thickness = if kind == 1 { 10f64.powi(size) } else { 0.0 };
                 let beyond = (kind > 1).then_some(normal);
-                faces.push(FaceContact { particles: numbers, beyond, thickness });
+                let limit = (kind > 2).then_some(FaceLimit { normal, distance: 10f64.powi(size) });
+                faces.push(if kind == 4 {
+                    edges(numbers, DVec3::from_array(normal)).into()
+                } else {
+                    FaceContact { particles: numbers, beyond, limit, thickness }.into()
+                });
             }
         }
         let law = ContactLaw { friction, ..SMOOTH };
@@ -970,7 +1314,7 @@ fn finite<R: Real>(
     points: &[([f64; 3], i32, i32)],
     law: &ContactLaw,
     pairs: &[PairContact],
-    faces: &[FaceContact],
+    faces: &[SurfaceContact],
     iterations: u32,
 ) -> Result<(), TestCaseError> {
     let mut solver = Solver::<R>::new(at);
@@ -978,7 +1322,7 @@ fn finite<R: Real>(
         solver.set_mass(p, 10f64.powi(*mass));
     }
     let in_pairs: Vec<[u32; 2]> = pairs.iter().map(|c| c.particles).collect();
-    let in_faces: Vec<[u32; 4]> = faces.iter().map(|c| c.particles).collect();
+    let in_faces: Vec<[u32; 4]> = faces.iter().map(SurfaceContact::particles).collect();
     let (in_pairs, in_faces) = (colors(at.len(), &in_pairs), colors(at.len(), &in_faces));
     // Coefficients out of the range of the precision are refused.
     if solver

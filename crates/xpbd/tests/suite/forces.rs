@@ -452,6 +452,7 @@ fn a_fixed_triangle_passes_a_contact_on() {
     let contact = FaceContact {
         particles: [0, 1, 2, 3],
         beyond: None,
+        limit: None,
         thickness: 0.0,
     };
     let law = ContactLaw {
@@ -460,7 +461,7 @@ fn a_fixed_triangle_passes_a_contact_on() {
     };
     let (none, one) = (Coloring::new(vec![]), Coloring::new(vec![ColorId(0)]));
     solver
-        .set_contacts(&law, (&[], &none), (&[contact], &one))
+        .set_contacts(&law, (&[], &none), (&[contact.into()], &one))
         .unwrap();
     solver.measure_forces(true);
     let settings = StepSettings {

@@ -1,0 +1,374 @@
+//! [`EdgeContact`]: two sharp edges that may meet between their ends, which no vertex notices.
+//!
+//! A vertex against a triangle sees all that touches but edges that cross: the rims of two slices, the edges of two boxes.
+//! Only *feature edges* are looked at: those between the outer surface and a cut face or between two cuts, and those whose
+//! triangles turn by more than 40° at rest. They are a few percent of all edges.
+//!
+//! Two feature edges are a candidate if all of these hold:
+//!
+//! 1. they share no particle, no live pair of a fresh cut connects them, and their parts may touch;
+//! 2. both are convex at present, and their directions differ by more than 3°: what is parallel is touched at vertices;
+//! 3. they are within reach of each other;
+//! 4. the plane through both directions parts the triangles of the one from those of the other. That is the condition under
+//!    which two edges, and not a vertex and a face, are what touches: on the sphere of normals, the arc between the
+//!    triangles of one edge crosses the opposite of the other's;
+//! 5. where they have passed each other, a way through tets leads from one of the edges to the other, as for a vertex, and
+//!    goes on as far again.
+//!
+//! The normal is the cross product of both directions, taken from the present positions in each update, with the sign
+//! that it had when the candidate was found: it does not change when the edges pass each other.
+//!
+//! Cost: the list of feature edges is a pass over the surface after a cut; a search refits a tree over them and looks at
+//! the edges near each of them.
+
+use glam::DVec3;
+use incise_mesh::{Bounds, ParticleId, TetId};
+use rayon::prelude::*;
+
+use crate::index::index;
+use crate::query::Query;
+use crate::surface::ContactSurface;
+use crate::tree::{Box32, TriangleTree};
+
+/// The cosine of the angle by which the triangles of a feature edge turn at rest.
+const SHARP: f64 = 0.766;
+/// The sine of the angle from which an edge counts as convex, and from which two edges are not parallel.
+const FLAT: f64 = 1e-3;
+const PARALLEL: f64 = 0.05;
+/// Triangles may lie beyond the plane between two edges by this sine.
+const BENT: f64 = 0.1;
+/// Edges whose closest points lie beyond their ends are no candidate if they have passed by this, in mean edges.
+const PASSED: f64 = 0.01;
+/// Edges that one task looks at.
+const CHUNK: usize = 128;
+
+/// Two edges that stay on their sides of each other: `n · (p₁ − p₂) ≥ 0` with the points `p₁` and `p₂` of both where their
+/// lines are closest, while these lie on the edges.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct EdgeContact {
+    /// The ends of the first edge, then those of the second; each ascending.
+    pub particles: [u32; 4],
+    /// Unit length, from the second edge to the first.
+    pub normal: DVec3,
+}
+
+impl EdgeContact {
+    /// The distance of the edges along the normal in m, negative where they have passed each other; at the points of the
+    /// edges nearest to where their lines are closest.
+    ///
+    /// # Panics
+    /// If a particle has no position.
+    #[must_use]
+    pub fn gap(&self, positions: &[DVec3]) -> f64 {
+        let [a, b, c, d] = self.particles.map(|p| positions[p as usize]);
+        let [first, second] = on_lines([a, b], [c, d]).map(|part| part.clamp(0.0, 1.0));
+        self.normal.dot(a.lerp(b, first) - c.lerp(d, second))
+    }
+
+    /// The distance of the edges in m.
+    ///
+    /// # Panics
+    /// If a particle has no position.
+    #[must_use]
+    pub fn distance(&self, positions: &[DVec3]) -> f64 {
+        let [a, b, c, d] = self.particles.map(|p| positions[p as usize]);
+        let [p, q] = closest_on_segments([a, b], [c, d]);
+        p.distance(q)
+    }
+
+    /// Takes the normal from the present positions; it stays where the edges are nearly parallel.
+    fn turn(&mut self, positions: &[DVec3]) {
+        let [a, b, c, d] = self.particles.map(|p| positions[p as usize]);
+        if let Some(normal) = across(b - a, d - c) {
+            self.normal = if normal.dot(self.normal) < 0.0 {
+                -normal
+            } else {
+                normal
+            };
+        }
+    }
+}
+
+/// The unit normal to two directions that are not parallel.
+fn across(one: DVec3, other: DVec3) -> Option<DVec3> {
+    let across = one.normalize_or_zero().cross(other.normalize_or_zero());
+    let sine = across.length();
+    (sine > PARALLEL).then(|| across / sine)
+}
+
+/// Where two lines that are not parallel are closest, as fractions of the segments that they go through.
+fn on_lines([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> [f64; 2] {
+    let (one, other, from) = (b - a, d - c, a - c);
+    let across = one.cross(other);
+    let square = across.length_squared();
+    [
+        from.cross(other).dot(-across) / square,
+        from.cross(one).dot(-across) / square,
+    ]
+}
+
+/// The points of two segments that are closest to each other.
+fn closest_on_segments([a, b]: [DVec3; 2], [c, d]: [DVec3; 2]) -> [DVec3; 2] {
+    let part = |x: DVec3, from: DVec3, along: DVec3| {
+        let part = (x - from).dot(along) / along.length_squared();
+        // A segment without length is a point.
+        if part.is_finite() {
+            part.clamp(0.0, 1.0)
+        } else {
+            0.0
+        }
+    };
+    let on_first = |x: DVec3| [a.lerp(b, part(x, a, b - a)), x];
+    let on_second = |x: DVec3| [x, c.lerp(d, part(x, c, d - c))];
+    // Inside of both, or with an end of one of them.
+    let [first, second] = on_lines([a, b], [c, d]);
+    let is_inside = |part: f64| (0.0..=1.0).contains(&part);
+    if is_inside(first) && is_inside(second) {
+        return [a.lerp(b, first), c.lerp(d, second)];
+    }
+    let ends = [on_second(a), on_second(b), on_first(c), on_first(d)];
+    let nearer = |one: [DVec3; 2], other: [DVec3; 2]| {
+        if other[0].distance_squared(other[1]) < one[0].distance_squared(one[1]) {
+            other
+        } else {
+            one
+        }
+    };
+    ends.into_iter().fold(ends[0], nearer)
+}
+
+/// An edge between two triangles.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Feature {
+    /// Ascending.
+    ends: [u32; 2],
+    /// The slot in whose triangle the edge runs from the first end to the second, and the other one.
+    slots: [u32; 2],
+}
+
+/// A feature edge at the present positions.
+#[derive(Clone, Copy)]
+struct Wedge {
+    ends: [DVec3; 2],
+    /// From the edge into each of the triangles, across the edge.
+    inward: [DVec3; 2],
+}
+
+/// The feature edges of a surface.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct FeatureEdges {
+    /// Ascending.
+    edges: Vec<Feature>,
+    tree: TriangleTree,
+    tree_is_due: bool,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    boxes: Vec<Box32>,
+    /// What each task found: room for a search.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    found: Vec<Vec<EdgeContact>>,
+}
+
+impl FeatureEdges {
+    /// Lists the edges of a surface; `rest` are the positions at rest. O(triangles).
+    pub(crate) fn list(&mut self, surface: &ContactSurface, rest: &[DVec3]) {
+        self.edges.clear();
+        for slot in (0..index(surface.slot_count())).filter(|&slot| surface.is_alive(slot)) {
+            let triangle = surface.triangle(slot);
+            for k in 0..3 {
+                let [p, q] = [k, k + 1].map(|k| triangle.particles[k % 3]);
+                let Some(other) = (p < q).then(|| beyond(surface, p, q)).flatten() else {
+                    continue;
+                };
+                let is_rim = triangle.tag != surface.triangle(other).tag;
+                let normals = [slot, other].map(|s| surface.area(s, rest).normalize_or_zero());
+                if is_rim || normals[0].dot(normals[1]) < SHARP {
+                    self.edges.push(Feature {
+                        ends: [p.0, q.0],
+                        slots: [slot, other],
+                    });
+                }
+            }
+        }
+        self.edges
+            .sort_unstable_by_key(|edge| (edge.ends, edge.slots));
+        self.tree_is_due = true;
+    }
+
+    pub(crate) fn clear(&mut self) {
+        self.edges.clear();
+        self.tree_is_due = true;
+    }
+
+    /// Whether both have the same edges.
+    pub(crate) fn same(&self, other: &Self) -> bool {
+        let of = |features: &Self| {
+            features
+                .edges
+                .iter()
+                .map(|e| (e.ends, e.slots))
+                .collect::<Vec<_>>()
+        };
+        of(self) == of(other)
+    }
+
+    pub(crate) fn count(&self) -> usize {
+        self.edges.len()
+    }
+
+    /// All candidates, ascending by the first edge, then the second.
+    pub(crate) fn search(&mut self, query: &Query<'_>, contacts: &mut Vec<EdgeContact>) {
+        let Self {
+            edges, boxes, tree, ..
+        } = self;
+        boxes.clear();
+        boxes.extend(edges.iter().map(|edge| {
+            let is_sound = edge.slots.iter().all(|&slot| query.shape.is_sound(slot));
+            let ends = edge.ends.map(|p| query.state.positions[p as usize]);
+            if is_sound {
+                Box32::around(&Bounds::around(ends))
+            } else {
+                Box32::EMPTY
+            }
+        }));
+        if self.tree_is_due {
+            tree.build(0..index(edges.len()), boxes, &[]);
+            self.tree_is_due = false;
+        } else {
+            tree.refit(boxes, &[]);
+        }
+        self.found
+            .resize_with(edges.len().div_ceil(CHUNK), Vec::new);
+        let (edges, tree) = (&self.edges, &self.tree);
+        let look = |(chunk, found): (usize, &mut Vec<EdgeContact>)| {
+            found.clear();
+            let end = edges.len().min(CHUNK * (chunk + 1));
+            for first in CHUNK * chunk..end {
+                look_around(query, edges, tree, first, found);
+            }
+        };
+        if self.found.len() < 2 {
+            self.found.iter_mut().enumerate().for_each(look);
+        } else {
+            self.found.par_iter_mut().enumerate().for_each(look);
+        }
+        contacts.clear();
+        self.found.iter().for_each(|found| contacts.extend(found));
+    }
+}
+
+/// Takes the normals of candidates from the present positions.
+pub(crate) fn turn(contacts: &mut [EdgeContact], positions: &[DVec3]) {
+    contacts
+        .iter_mut()
+        .for_each(|contact| contact.turn(positions));
+}
+
+/// The triangle in which an edge runs in the other direction.
+fn beyond(surface: &ContactSurface, p: ParticleId, q: ParticleId) -> Option<u32> {
+    let mut fan = surface.corners(p);
+    fan.find(|&(slot, k)| surface.triangle(slot).particles[(k + 2) % 3] == q)
+        .map(|(slot, _)| slot)
+}
+
+/// Appends the candidates of an edge with those after it.
+fn look_around(
+    query: &Query<'_>,
+    edges: &[Feature],
+    tree: &TriangleTree,
+    first: usize,
+    found: &mut Vec<EdgeContact>,
+) {
+    let edge = &edges[first];
+    let Some(wedge) = wedge(query, edge) else {
+        return;
+    };
+    let begin = found.len();
+    let around = Bounds::around(wedge.ends).widened(query.reach);
+    tree.search(&Box32::around(&around), |leaf| {
+        if leaf.number as usize > first {
+            found.extend(contact(query, (edge, &wedge), &edges[leaf.number as usize]));
+        }
+    });
+    found[begin..].sort_unstable_by_key(|contact| contact.particles);
+}
+
+/// An edge that is sound and convex at present.
+fn wedge(query: &Query<'_>, edge: &Feature) -> Option<Wedge> {
+    let shape = &query.shape;
+    let normals = edge.slots.map(|slot| shape.normal(slot));
+    let ends = edge.ends.map(|p| query.state.positions[p as usize]);
+    let along = (ends[1] - ends[0]).normalize_or_zero();
+    // Triangles are counterclockwise.
+    let inward = [normals[0].cross(along), normals[1].cross(-along)];
+    let is_sound = edge.slots.iter().all(|&slot| shape.is_sound(slot));
+    let is_convex = normals[0].dot(inward[1]) < -FLAT;
+    (is_sound && is_convex).then_some(Wedge { ends, inward })
+}
+
+fn contact(
+    query: &Query<'_>,
+    (edge, wedge_of_edge): (&Feature, &Wedge),
+    other: &Feature,
+) -> Option<EdgeContact> {
+    let shares = |p: &u32| other.ends.contains(p);
+    let mut ends = edge.ends.iter();
+    if ends.any(|&p| shares(&p) || query.pairs.partners(ParticleId(p)).any(|p| shares(&p.0))) {
+        return None;
+    }
+    let tets = [edge, other].map(|edge| query.shape.triangle(edge.slots[0]).tet);
+    if !query.may_touch_each_other(tets) {
+        return None;
+    }
+    let (one, two) = (wedge_of_edge, wedge(query, other)?);
+    let [p, q] = closest_on_segments(one.ends, two.ends);
+    let distance = p.distance(q);
+    if distance > query.reach || distance.is_nan() {
+        return None;
+    }
+    let normal = across(one.ends[1] - one.ends[0], two.ends[1] - two.ends[0])?;
+    // The first edge lies above the second, with its triangles going up and those of the second going down.
+    let is_above = |normal: DVec3| {
+        let up = |wedge: &Wedge| wedge.inward.map(|inward| inward.dot(normal));
+        up(one).iter().all(|up| *up >= -BENT) && up(&two).iter().all(|up| *up <= BENT)
+    };
+    let normal = match [is_above(normal), is_above(-normal)] {
+        [true, false] => normal,
+        [false, true] => -normal,
+        _ => return None,
+    };
+    let [a, b] = edge.ends;
+    let [c, d] = other.ends;
+    let contact = EdgeContact {
+        particles: [a, b, c, d],
+        normal,
+    };
+    if contact.gap(query.state.positions) >= 0.0 {
+        return Some(contact);
+    }
+    let parts = on_lines(one.ends, two.ends);
+    let meet = parts.iter().all(|part| (0.0..=1.0).contains(part));
+    let is_valid = if meet {
+        has_way(query, other, [q, p], edge) || has_way(query, edge, [p, q], other)
+    } else {
+        contact.gap(query.state.positions) > -PASSED * query.mean_edge
+    };
+    is_valid.then_some(contact)
+}
+
+/// Whether a way through tets leads from a point of an edge to one of another edge that is inside, which ends in none of
+/// the other's own tets, and on as far again.
+fn has_way(query: &Query<'_>, from: &Feature, [start, end]: [DVec3; 2], to: &Feature) -> bool {
+    let tets = from.slots.map(|slot| query.shape.triangle(slot).tet);
+    let ends = |x: DVec3| {
+        tets.into_iter()
+            .filter_map(move |tet| query.walk(tet, [start, x]))
+    };
+    let is_own = |tet: TetId| {
+        let corners = query.state.mesh.mesh().tets[tet.index()];
+        to.ends.iter().any(|&p| corners.contains(&ParticleId(p)))
+    };
+    ends(end).any(|tet| !is_own(tet)) && ends(start + (end - start) * 2.0).next().is_some()
+}
