@@ -68,6 +68,9 @@ pub(crate) struct Island {
     /// The solid blades of the frame that touch its cuts, with the numbers of their strokes.
     #[cfg_attr(feature = "save", serde(skip))]
     pub(crate) blades: Vec<(u32, SolidBlade)>,
+    /// The work in J of the edges of these blades in the last frame.
+    #[cfg_attr(feature = "save", serde(skip))]
+    pub(crate) edge_work: Vec<f64>,
     /// The forces of the last frame that measured them.
     pub(crate) forces: Option<Box<Measured>>,
     /// In a scene with contact.
@@ -247,6 +250,7 @@ impl Island {
             spare_frames: Vec::new(),
             distances: joined.distances,
             blades: Vec::new(),
+            edge_work: Vec::new(),
             forces: None,
             contacts,
             grabs: Grabs::default(),
@@ -519,6 +523,7 @@ impl Island {
         };
         // Also after an error: no blade may stay behind.
         if !self.blades.is_empty() {
+            self.edge_work = each!(&self.solver, solver => solver.blade_work().to_vec());
             self.set_blades(Vec::new())?;
         }
         let step = step?;

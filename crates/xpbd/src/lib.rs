@@ -74,8 +74,8 @@ pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};
 pub use constraints::{
     AttachmentData, ContactData, ContactFactors, ContactLaw, ContactRound, ContactState,
-    DistanceConstraint, DistanceData, FaceContact, PairContact, SolidBlade, VolumeConstraint,
-    VolumeData,
+    DistanceConstraint, DistanceData, EdgePoint, FaceContact, PairContact, SolidBlade,
+    VolumeConstraint, VolumeData,
 };
 pub use device::TetData;
 pub use error::XpbdError;

@@ -123,6 +123,7 @@ impl Island {
             distances,
             forces: None,
             blades: Vec::new(),
+            edge_work: Vec::new(),
             contacts,
             grabs,
             volumes,

@@ -115,6 +115,11 @@ pub struct SolidBladeSpec {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e3))]
     pub friction: f64,
+    /// Work that it takes to part a square meter of tissue: the tissue gives before the edge until the force at the edge is
+    /// this times the length of the edge in it, and then parts at this force. 0: parting takes no force.
+    #[serde(default)]
+    #[schemars(extend("unit" = "J/m²"), range(min = 0.0, max = 1e9))]
+    pub toughness: f64,
 }
 
 impl StrokeSpec {

@@ -10,6 +10,7 @@ mod builder;
 mod conservation;
 mod constraints;
 mod contact;
+mod contact_states;
 mod cutting;
 mod determinism;
 mod edits;
