@@ -112,12 +112,11 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
 }
 
 fn solver(substeps: u32) -> SolverSpec {
-    SolverSpec {
-        precision: Precision::F32,
-        substeps: substeps.into(),
-        method: Method::GaussSeidel,
-        ..SolverSpec::default()
-    }
+    SolverSpec::default().with(|spec| {
+        spec.precision = Precision::F32;
+        spec.substeps = substeps.into();
+        spec.method = Method::GaussSeidel;
+    })
 }
 
 /// A liver of 25 cm that a plane cuts: lying on the ground with one part on the other, or at rest without a load.
@@ -130,17 +129,12 @@ fn liver(lies: bool, tets: usize, contact: bool) -> anyhow::Result<SimulationBui
         builder.gravity(DVec3::NEG_Z * 9.81).ground(-0.1, 0.8);
     }
     if contact {
-        builder.contact(ContactSpec {
-            friction: 0.5,
-            ..ContactSpec::default()
-        });
+        builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
     }
-    builder.add_stroke(StrokeSpec::Plane {
-        frame: if lies { 40 } else { 4 },
-        point: [0.0, 0.0, if lies { -0.05 } else { 0.0 }],
-        normal: [0.1, 0.05, 1.0],
-        snap: 0.1,
-    });
+    let frame = if lies { 40 } else { 4 };
+    let height = if lies { -0.05 } else { 0.0 };
+    let plane = StrokeSpec::plane(frame, [0.0, 0.0, height], [0.1, 0.05, 1.0]);
+    builder.add_stroke(plane);
     Ok(builder)
 }
 
@@ -212,10 +206,7 @@ fn stack(count: u32) -> SimulationBuilder {
         let cube = Body::new(kuhn_box([2; 3], DVec3::splat(EDGE))).position(at);
         builder.add_body(cube.young_modulus(2e7).damping(0.005));
     }
-    builder.contact(ContactSpec {
-        friction: 0.5,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
     builder
 }
 
@@ -234,12 +225,8 @@ fn pile(tets: usize) -> anyhow::Result<SimulationBuilder> {
         builder.add_body(body.young_modulus(2e4).density(1050.0).damping(0.005));
     }
     for [x, y] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
-        builder.add_collider(ColliderSpec::Plane {
-            point: [-0.11 * x, -0.11 * y, 0.0],
-            normal: [x, y, 0.0],
-            friction: 0.2,
-            velocity: [0.0; 3],
-        });
+        let wall = ColliderSpec::plane([-0.11 * x, -0.11 * y, 0.0], [x, y, 0.0]);
+        builder.add_collider(wall.with_friction(0.2));
     }
     builder.contact(ContactSpec::default());
     Ok(builder)

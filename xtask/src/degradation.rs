@@ -134,10 +134,10 @@ fn scene_at_rest(model: &Model, strokes: u64, snap: f64) -> Scene {
 fn runs(model: &Model, strokes: u64, threads: usize) -> anyhow::Result<Vec<Run>> {
     let mut scene = scene_at_rest(model, strokes, 0.1);
     let mut runs = Vec::new();
-    let renewing = Some(ReclusterSpec {
-        threshold: 1.25,
-        frames: NonZeroU32::MIN.saturating_add(9),
-    });
+    let renewing = Some(ReclusterSpec::default().with(|spec| {
+        spec.threshold = 1.25;
+        spec.frames = NonZeroU32::MIN.saturating_add(9);
+    }));
     for (name, merges, recluster) in [
         ("no merging", false, None),
         ("merging", true, None),
@@ -174,13 +174,12 @@ fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64, snap: f64) -> Vec<Str
             middle + 0.2 * DEPTH * size * normal,
             middle - DEPTH * size * normal,
         ];
-        StrokeSpec::Sweep {
-            frames: [FRAMES * i, FRAMES * i + FRAMES - 1],
-            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
-            path: vec![[0.0; 3], (along * scale).to_array()],
-            snap,
-            solid: None,
-        }
+        StrokeSpec::sweep(
+            [FRAMES * i, FRAMES * i + FRAMES - 1],
+            blade.map(|x| (x * scale).to_array()).to_vec(),
+            vec![[0.0; 3], (along * scale).to_array()],
+        )
+        .with_snap(snap)
     };
     (0..strokes).map(stroke).collect()
 }

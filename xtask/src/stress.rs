@@ -161,10 +161,9 @@ fn stress_one(
         let mut scene = scene(model, &mut random);
         if arguments.contact {
             scene.contact = Some(ContactSpec::default());
-            scene.report = ReportSpec {
-                every: 1,
-                quantities: vec![Quantity::Energy],
-            };
+            scene.report = ReportSpec::default().with(|spec| {
+                spec.quantities = vec![Quantity::Energy];
+            });
         }
         let mut simulation = Simulation::new(&scene)?;
         let limit = 3 * simulation.mesh().tets.len();
@@ -290,10 +289,10 @@ fn scene(model: &Model, random: &mut Random) -> Scene {
     let body: &mut BodySpec = &mut scene.body[0];
     body.young_modulus = 2e4;
     scene.solver.precision = [Precision::F32, Precision::F64][random.below(2)];
-    scene.world.ground = Some(incise::scene::GroundSpec {
-        height: -1.0,
-        friction: 0.5,
-    });
+    scene.world.ground = Some(incise::scene::GroundSpec::default().with(|spec| {
+        spec.height = -1.0;
+        spec.friction = 0.5;
+    }));
     scene
 }
 
@@ -312,13 +311,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
     let array = DVec3::to_array;
     let (frame, snap) = (0, [0.0, 0.05, 0.1, 0.1, 0.1, 0.2][random.below(6)]);
     match random.below(10) {
-        0..=3 => StrokeSpec::Rectangle {
-            frame,
-            center: array(&center),
-            half_u: array(&u),
-            half_v: array(&v),
-            snap,
-        },
+        0..=3 => StrokeSpec::rectangle(frame, array(&center), array(&u), array(&v)).with_snap(snap),
         4 | 5 => {
             // A strip of two bays, bent at the middle.
             let bend = normal * size * random.unit();
@@ -326,38 +319,26 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
             let points = rows
                 .iter()
                 .flat_map(|row| [array(&(*row - u)), array(&(*row + u))]);
-            StrokeSpec::Surface {
+            StrokeSpec::surface(
                 frame,
-                points: points.collect(),
-                triangles: vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
-                snap,
-            }
+                points.collect(),
+                vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
+            )
+            .with_snap(snap)
         }
-        6 => StrokeSpec::Punch {
-            frame,
-            region: Region::Sphere {
-                center: array(&center),
-                radius: size,
-            },
-            snap,
-        },
-        7 if random.below(8) == 0 => StrokeSpec::Remove {
-            frame,
-            region: Region::Sphere {
-                center: array(&center),
-                radius: 0.5 * size,
-            },
-        },
+        6 => StrokeSpec::punch(frame, Region::sphere(array(&center), size)).with_snap(snap),
+        7 if random.below(8) == 0 => {
+            StrokeSpec::remove(frame, Region::sphere(array(&center), 0.5 * size))
+        }
         _ => {
             let frames = 2 + random.below(6) as u64;
             let middle = center + normal * size * 0.3;
-            StrokeSpec::Sweep {
-                frames: [0, frames],
-                blade: vec![array(&(middle - u)), array(&(middle + u))],
-                path: vec![array(&-v), array(&(normal * size * 0.2)), array(&v)],
-                snap,
-                solid: None,
-            }
+            StrokeSpec::sweep(
+                [0, frames],
+                vec![array(&(middle - u)), array(&(middle + u))],
+                vec![array(&-v), array(&(normal * size * 0.2)), array(&v)],
+            )
+            .with_snap(snap)
         }
     }
 }
@@ -371,6 +352,7 @@ fn due(mut stroke: StrokeSpec, now: u64) -> StrokeSpec {
         | StrokeSpec::Punch { frame, .. }
         | StrokeSpec::Remove { frame, .. } => *frame = now,
         StrokeSpec::Sweep { frames, .. } => *frames = [now, now + frames[1] - frames[0]],
+        _ => unreachable!("random strokes are of these kinds"),
     }
     stroke
 }

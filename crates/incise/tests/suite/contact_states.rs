@@ -1,7 +1,7 @@
 //! Contact through everything else that changes a scene: sleep, snapshots, undo, files, removal and cuts of what touches.
 
 use incise::mesh::glam::{DVec3, dvec3};
-use incise::scene::{ContactSpec, Precision, SleepSpec, SolverSpec};
+use incise::scene::{ContactSpec, Precision, SleepSpec};
 use incise::{Event, Simulation, SimulationBuilder};
 
 use crate::contact::{EDGE, GRAVITY, cube, cut, intruders, seen, solver, steps, steps_of};
@@ -9,13 +9,11 @@ use crate::contact::{EDGE, GRAVITY, cube, cut, intruders, seen, solver, steps, s
 /// Cubes on each other that may sleep, of which strokes cut some.
 fn tower(count: u32, precision: Precision) -> SimulationBuilder {
     let mut builder = Simulation::builder();
-    let spec = SolverSpec {
-        sleep: Some(SleepSpec {
-            speed: 1e-2,
-            time: 0.2,
-        }),
-        ..solver(precision, 20)
-    };
+    let sleep = SleepSpec::default().with(|spec| {
+        spec.speed = 1e-2;
+        spec.time = 0.2;
+    });
+    let spec = solver(precision, 20).with(|spec| spec.sleep = Some(sleep));
     builder.gravity(GRAVITY).ground(0.0, 0.5).solver(spec);
     for number in 0..count {
         let at = dvec3(0.0, 0.0, EDGE * f64::from(number));
@@ -149,10 +147,7 @@ fn a_piece_in_contact_is_cut_again() {
             .solver(solver(Precision::F64, 20))
             .threads(threads);
         builder.add_body(cube(DVec3::ZERO).young_modulus(3e5).damping(0.05));
-        builder.contact(ContactSpec {
-            friction: 0.8,
-            ..ContactSpec::default()
-        });
+        builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.8));
         let mut simulation = builder.build().unwrap();
         let mut frames = Vec::new();
         // The slab above, its two halves, and the block below with them.
