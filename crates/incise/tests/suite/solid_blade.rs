@@ -322,16 +322,13 @@ fn tough(toughness: f64) -> SolidBladeSpec {
 /// How far a tough blade moves in a frame.
 const WAY: f64 = 0.002;
 
-/// The force on a blade, and what it has parted, after each frame on its way through the loaf from x = -0.01 on. Its edge
-/// begins at a y.
+/// The force on a blade, and what it has parted, after each frame on its way through the loaf from x = -0.01 on.
 fn part(
     solver: SolverSpec,
     solid: &SolidBladeSpec,
-    from: f64,
     snap: f64,
 ) -> (Simulation, Vec<(DVec3, CutWork)>) {
     let mut simulation = loaf(solver).build().unwrap();
-    let edge = |x: f64| [from, 0.05].map(|y| dvec3(x, y, 0.003));
     let stroke = simulation
         .begin_solid_stroke(&edge(-0.01), snap, solid)
         .unwrap();
@@ -354,19 +351,18 @@ fn part(
 }
 
 /// At a constant speed the force on a blade is the toughness times the width of the tissue that it cuts, up to 5%, of which
-/// 2% are the wedge that holds the cut open; also for a blade that reaches over half of the width only. The work of its drive
-/// is in every frame at least what its edge does, and that is at least the toughness times the area of the cut, but for what
-/// the cut is ahead of the edge: part of a tet.
+/// 2% are the wedge that holds the cut open. The work of its drive is in every frame at least what its edge does, and that is
+/// at least the toughness times the area of the cut, but for what the cut is ahead of the edge: part of a tet.
 #[test]
 fn parting_takes_the_toughness_times_the_width() {
-    for (precision, toughness, from, snap) in [
-        (Precision::F64, 100.0, -0.05, 0.1),
-        (Precision::F64, 30.0, -0.05, 0.0),
-        (Precision::F32, 60.0, -0.05, 0.1),
+    for (precision, toughness, snap) in [
+        (Precision::F64, 100.0, 0.1),
+        (Precision::F64, 30.0, 0.0),
+        (Precision::F32, 60.0, 0.1),
     ] {
         let solid = tough(toughness);
-        let (_, frames) = part(gauss_seidel(precision), &solid, from, snap);
-        let width = 0.03 - from.max(-0.03);
+        let (_, frames) = part(gauss_seidel(precision), &solid, snap);
+        let width = 0.06;
         let expected = toughness * width;
         let steady = &frames[40..80];
         let mean = steady.iter().map(|(force, _)| -force.x).sum::<f64>() / steady.len() as f64;
