@@ -97,7 +97,7 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
     }
     cells.push(Cell::new("pile", move || {
         let (tets, frames) = if quick {
-            (100, [5, 3])
+            (200, [5, 3])
         } else {
             (1_000, [200, 30])
         };
@@ -168,7 +168,7 @@ fn cost(lies: bool, threads: usize, quick: bool) -> anyhow::Result<Cost> {
     let most = |of: fn(&incise::report::ContactReport) -> f64| {
         contacts().map(|contact| of(&contact)).fold(0.0, f64::max)
     };
-    let end = contacts().last().unwrap_or_default();
+    let end = contacts().next_back().unwrap_or_default();
     Ok(Cost {
         scene: if lies {
             "upper part lies on the lower".to_owned()

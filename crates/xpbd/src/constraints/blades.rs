@@ -169,8 +169,8 @@ impl<R: Float> Placed<R> {
         let (mut now, mut ahead) = (R::ZERO, R::ZERO);
         for (&p, &weight) in point.particles.iter().zip(&point.weights) {
             let (p, weight) = (p as usize, R::from_f64(weight));
-            now = now + R::dot(self.front, load::<R>(&particles.cells[p]) - at) * weight;
-            ahead = ahead + R::dot(self.front, particles.previous[p] - was_at) * weight;
+            now += R::dot(self.front, load::<R>(&particles.cells[p]) - at) * weight;
+            ahead += R::dot(self.front, particles.previous[p] - was_at) * weight;
         }
         // A point behind it is one that it has passed before.
         let passed = if ahead < R::ZERO { ahead } else { R::ZERO };
@@ -332,8 +332,8 @@ impl<R: Float> ConstraintKind<R> for Blades<R> {
             let per_length = R::from_f64(blade.toughness) * substep.factors.time_squared;
             for (point, pushed) in blade.uncut.iter().zip(&mut self.pushed[points]) {
                 let limit = per_length * R::from_f64(point.length);
-                let mut push = self.pushes.get_mut(number);
-                hold(placed, point, limit, pushed, particles, push.as_deref_mut());
+                let push = self.pushes.get_mut(number);
+                hold(placed, point, limit, pushed, particles, push);
             }
         }
     }
@@ -394,7 +394,7 @@ fn hold<R: Float>(
     let wanted = way / per_mass;
     // Tissue that is held whole does not yield.
     let by = if wanted < rest { wanted } else { rest };
-    *pushed = *pushed + by;
+    *pushed += by;
     for (p, share) in corners.clone() {
         let cell = &particles.cells[p as usize];
         let part = placed.front * (by * share);

@@ -750,7 +750,7 @@ fn an_edge_passes_at_the_toughness_times_its_length() {
                 "{force}"
             );
             assert_eq!([force.y, force.z], [0.0; 2]);
-            if work == 0.0 && at > 0.001 {
+            if work < 1e-6 * limit * 5e-5 && at > 0.001 {
                 assert!((x - at).abs() < 1e-9, "{number}: {x} {at}");
                 gives += 1;
             } else if at > 0.001 && number > 1000 {
