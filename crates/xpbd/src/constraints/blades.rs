@@ -370,7 +370,7 @@ fn edge_points(blade: &SolidBlade) -> usize {
     }
 }
 
-/// Keeps a point of tissue before an edge, as far as the limit of what it can be pushed by in a substep allows.
+/// Keeps a point of tissue before an edge, up to the limit of what it can be pushed by in a substep.
 fn hold<R: Float>(
     placed: &Placed<R>,
     point: &EdgePoint,
