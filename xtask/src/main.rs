@@ -5,6 +5,7 @@
 mod accuracy;
 mod coloring;
 mod comparison;
+mod contact;
 mod cutting;
 mod defaults;
 mod degradation;
@@ -84,6 +85,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     ("defaults", defaults::all),
     ("overhead", overhead::run),
     ("comparison", comparison::usual),
+    ("contact", contact::run),
 ];
 
 #[derive(Debug, Subcommand)]
@@ -92,6 +94,8 @@ enum Command {
     All(ExperimentArguments),
     /// Cluster and color meshes by all methods, and write tables.
     Coloring(coloring::ColoringArguments),
+    /// Measure the cost of contact and the depth of stacks and piles, and write a page.
+    Contact(ExperimentArguments),
     /// Measure the cost of cuts by stage and mesh size, and the effect of snapping.
     Cutting(cutting::CuttingArguments),
     /// Default settings: errors against Newton's method, and bodies after cuts, under load and at rest.
@@ -130,6 +134,7 @@ fn main() -> anyhow::Result<()> {
     match Arguments::parse().command {
         Command::All(arguments) => EXPERIMENTS.iter().try_for_each(|(_, run)| run(&arguments)),
         Command::Coloring(arguments) => coloring::coloring(&arguments),
+        Command::Contact(arguments) => contact::run(&arguments),
         Command::Cutting(arguments) => cutting::cutting(&arguments),
         Command::Defaults(arguments) => defaults::defaults(&arguments),
         Command::GpuSweep(arguments) => gpu::sweep(&arguments),

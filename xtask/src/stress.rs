@@ -5,6 +5,11 @@
 //! previous stroke, sometimes a removal of tets. After every frame with a stroke all derived data is recomputed and
 //! compared (`Simulation::check`), positions must be finite, and the deltas must agree with the mesh. Cutting only adds
 //! tets, so a body that has tripled is replaced by a new one. The seed determines everything.
+//!
+//! With `--contact` parts and sides of cuts touch. Energy is measured then: kinetic, elastic and gravity together must not
+//! grow in a frame by more than a part in a thousand of the energy that the body has when it falls by its own size. Frames
+//! that take tets away or collapse edges change the body and are left out. Frames that gain more are counted, and fail the run
+//! at its end. With `--energy` energy is measured without contact, to compare.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -12,9 +17,10 @@ use std::time::Instant;
 use anyhow::{Context, bail, ensure};
 use clap::Args;
 use incise::cutting::Skin;
-use incise::mesh::TetId;
 use incise::mesh::glam::DVec3;
-use incise::scene::{BodySpec, Precision, Region, StrokeSpec};
+use incise::mesh::{Bounds, TetId};
+use incise::report::CutReport;
+use incise::scene::{BodySpec, ContactSpec, Precision, Quantity, Region, ReportSpec, StrokeSpec};
 use incise::{Scene, Simulation};
 
 use crate::models::{Model, models};
@@ -38,7 +44,16 @@ pub(crate) struct StressArguments {
     /// Also the mesh of this file.
     #[arg(long, value_name = "FILE")]
     mesh: Option<PathBuf>,
+    /// Let bodies, pieces and the sides of cuts touch, and measure energy.
+    #[arg(long)]
+    contact: bool,
+    /// Measure energy without contact, too.
+    #[arg(long)]
+    energy: bool,
 }
+
+/// Largest growth of the energy in a frame, as a part of weight times size of the body.
+const MOST_GAINED: f64 = 1e-3;
 
 /// Statistics of a stress run.
 #[derive(Debug, Default)]
@@ -53,6 +68,16 @@ struct Tally {
     least_dihedral: f64,
     least_ratio: f64,
     most_colors: usize,
+    /// The largest growth of the energy in a frame, as a part of weight times size.
+    most_gained: f64,
+    /// Frames with more growth than is allowed, and the first of them.
+    gaining: u64,
+    first_gain: Option<String>,
+    /// The most contacts that pressed in a frame.
+    most_active: usize,
+    /// The deepest contact in mean edges.
+    deepest: f64,
+    repaired: usize,
 }
 
 #[expect(
@@ -66,7 +91,8 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
         bodies.insert(0, Model::read(path.clone())?);
     }
     let start = Instant::now();
-    let mut table = table([
+    let mut gains: Vec<String> = Vec::new();
+    let mut columns = vec![
         "mesh",
         "strokes",
         "that cut",
@@ -79,14 +105,25 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
         "most colors",
         "smallest dihedral",
         "worst volume ratio",
-    ]);
+    ];
+    let with_energy = arguments.contact || arguments.energy;
+    if with_energy {
+        columns.extend([
+            "most contacts",
+            "deepest in edges",
+            "repaired",
+            "most energy gained",
+            "frames that gain too much",
+        ]);
+    }
+    let mut table = table(columns);
     for (i, model) in bodies.iter().enumerate() {
         // Each mesh gets its share of the time.
         let share = (i + 1) as f64 / bodies.len() as f64;
         let end = arguments.seconds.map(|seconds| seconds * share);
         let late = || end.is_some_and(|end| start.elapsed().as_secs_f64() > end);
         let tally = stress_one(model, arguments, late)?;
-        table.add_row([
+        let mut row = vec![
             model.name.clone(),
             tally.strokes.to_string(),
             tally.cut.to_string(),
@@ -102,9 +139,21 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
             tally.most_colors.to_string(),
             format!("{:.3}°", tally.least_dihedral),
             format!("{:.1e}", tally.least_ratio),
-        ]);
+        ];
+        if with_energy {
+            row.extend([
+                tally.most_active.to_string(),
+                format!("{:.3}", tally.deepest),
+                tally.repaired.to_string(),
+                format!("{:.1e}", tally.most_gained),
+                tally.gaining.to_string(),
+            ]);
+        }
+        gains.extend(tally.first_gain);
+        table.add_row(row);
     }
     println!("{table}");
+    ensure!(gains.is_empty(), "energy is gained: {}", gains.join("; "));
     Ok(())
 }
 
@@ -122,8 +171,18 @@ fn stress_one(
     };
     while tally.strokes < arguments.strokes && !late() {
         tally.bodies += 1;
-        let mut simulation = Simulation::new(&scene(model, &mut random))?;
+        let mut scene = scene(model, &mut random);
+        if arguments.contact {
+            scene.contact = Some(ContactSpec::default());
+        }
+        if arguments.contact || arguments.energy {
+            scene.report = ReportSpec::default().with(|spec| {
+                spec.quantities = vec![Quantity::Energy];
+            });
+        }
+        let mut simulation = Simulation::new(&scene)?;
         let limit = 3 * simulation.mesh().tets.len();
+        let mut energy = Energy::new(&scene, &simulation);
         let mut skin = Skin::new(simulation.boundary());
         let mut last = None;
         while tally.strokes < arguments.strokes && simulation.mesh().tets.len() < limit && !late() {
@@ -137,7 +196,9 @@ fn stress_one(
             simulation.cut(stroke.clone())?;
             tally.strokes += 1;
             for _ in 0..frames {
-                checked_step(&mut simulation, &mut skin, &mut tally).with_context(|| {
+                let step = checked_step(&mut simulation, &mut skin, &mut tally);
+                energy.note(&simulation, &mut tally);
+                step.with_context(|| {
                     let (seed, strokes) = (arguments.seed, tally.strokes);
                     format!("{}, seed {seed}, stroke {strokes}: {stroke:?}", model.name)
                 })?;
@@ -183,10 +244,58 @@ fn checked_step(
         let least = cut.dihedral.map_or(f64::INFINITY, |[least, _]| least);
         tally.least_dihedral = tally.least_dihedral.min(least);
     }
+    tally.repaired += report.repaired;
+    if let Some(contact) = report.contact {
+        tally.most_active = tally.most_active.max(contact.active);
+        tally.deepest = tally.deepest.max(contact.max_depth);
+    }
     tally.detached += report.detached.len();
     tally.most_pieces = tally.most_pieces.max(report.pieces);
     tally.most_colors = tally.most_colors.max(report.colors);
     Ok(())
+}
+
+/// The energy of a body from frame to frame, where it is reported.
+struct Energy {
+    /// That of the last frame in J.
+    last: Option<f64>,
+    /// Weight times size in J.
+    scale: f64,
+}
+
+impl Energy {
+    fn new(scene: &Scene, simulation: &Simulation) -> Self {
+        let mesh = simulation.mesh();
+        let bounds = Bounds::around(mesh.positions.iter().copied());
+        let mass = scene.body[0].density * mesh.total_volume();
+        Self {
+            last: None,
+            scale: mass * 9.81 * bounds.size().max_element(),
+        }
+    }
+
+    /// Counts the last frame if it has gained energy.
+    fn note(&mut self, simulation: &Simulation, tally: &mut Tally) {
+        let report = simulation.report();
+        let Some(energy) = report.energy else {
+            return;
+        };
+        let now = energy.kinetic + energy.elastic + energy.gravity;
+        let changes_body = |cut: &CutReport| cut.tets_removed > 0 || cut.collapsed > 0;
+        let last = self.last.replace(now);
+        let last = last.filter(|_| !report.cut.as_ref().is_some_and(changes_body));
+        let gained = last.map_or(0.0, |last| (now - last) / self.scale);
+        tally.most_gained = tally.most_gained.max(gained);
+        if gained > MOST_GAINED {
+            tally.gaining += 1;
+            tally.first_gain.get_or_insert_with(|| {
+                format!(
+                    "stroke {}, frame {}: from {last:?} to {now} J, {gained:.1e} of weight times size; {energy:?}, {:?}",
+                    tally.strokes, report.frame, report.contact,
+                )
+            });
+        }
+    }
 }
 
 /// The built-in scene without its stroke, with a ground below.

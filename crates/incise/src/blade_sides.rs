@@ -2,20 +2,23 @@
 //!
 //! Just after a cut both sides are at one place, so positions cannot tell to which side a particle belongs. The triangles
 //! of the cut can: each looks away from its tissue. A particle with triangles that look both ways is on the front of the
-//! cut, where the sides are one, and is left alone. Cost: a pass over the boundary triangles in frames with such a blade.
+//! cut, where the sides are one, and is left alone: it is the edge that meets it, where the blade has a toughness
+//! ([`edge_points`]). Cost: a pass over the boundary triangles in frames with such a blade.
 
 use std::collections::BTreeMap;
 
 use glam::DVec3;
 use incise_cutting::FaceTag;
 
+use crate::edge_points::edge_points;
 use crate::island::Island;
 use crate::solid_blade::FrameBlade;
 
 /// How far a triangle may lean against the blade and still say which side it is on, as a cosine.
 const LEANING: f64 = 0.3;
 
-/// The blades of a frame that touch the cuts of an island, with the particles on each side.
+/// The blades of a frame that touch the cuts of an island or press on it, with the particles on each side and the uncut
+/// tissue at the edge.
 pub(crate) fn touching(
     island: &Island,
     blades: &[FrameBlade],
@@ -23,7 +26,11 @@ pub(crate) fn touching(
     let with_sides = blades.iter().filter_map(|frame| {
         let mut blade = frame.blade.clone()?;
         blade.sides = sides(island, frame.stroke, &blade);
-        (!blade.sides.is_empty()).then_some((frame.stroke, blade))
+        if blade.toughness > 0.0 {
+            blade.uncut = edge_points(island, frame.stroke, &blade, frame.owes);
+        }
+        let touches = !blade.sides.is_empty() || !blade.uncut.is_empty();
+        touches.then_some((frame.stroke, blade))
     });
     with_sides.collect()
 }

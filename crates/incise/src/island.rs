@@ -54,6 +54,9 @@ pub(crate) struct Constraints {
     /// The solid blades of the frame that touch its cuts, with the numbers of their strokes.
     #[cfg_attr(feature = "save", serde(skip))]
     pub(crate) blades: Vec<(u32, SolidBlade)>,
+    /// The work in J of the edges of these blades in the last frame.
+    #[cfg_attr(feature = "save", serde(skip))]
+    pub(crate) edge_work: Vec<f64>,
 }
 
 /// Bodies that are solved together. A copy has the state as it is known here, and its solver on the processor.
@@ -167,6 +170,7 @@ impl Island {
                 volumes,
                 contacts,
                 blades: Vec::new(),
+                edge_work: Vec::new(),
             },
             forces: None,
             positions: Vec::new(),
@@ -246,6 +250,8 @@ impl Island {
         };
         // Also after an error: no blade may stay behind.
         if !self.constraints.blades.is_empty() {
+            self.constraints.edge_work =
+                each!(&self.solver, solver => solver.blade_work().to_vec());
             self.set_blades(Vec::new())?;
         }
         let step = step?;

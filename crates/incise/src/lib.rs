@@ -33,6 +33,7 @@ mod contacts;
 #[cfg(feature = "gpu")]
 mod device;
 mod distance;
+mod edge_points;
 mod error;
 mod event;
 mod forces;

@@ -205,6 +205,21 @@ pub struct CutReport {
     /// The smallest and the largest dihedral angle of a new tet at rest in degrees; absent if none is new.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub dihedral: Option<[f64; 2]>,
+    /// Work in J of the parting by blades with a toughness: toughness times new area of the cut at rest; absent if there is
+    /// none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub work: Option<f64>,
+}
+
+/// What the blade of a stroke has parted against the toughness of the tissue.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+pub struct CutWork {
+    /// Work in J that the edge has done on its way through tissue: the force at the edge times the way, summed up. It differs
+    /// from `toughness · area` by what the edge is ahead of the open cut, or the cut of the edge: less than a tet.
+    pub work: f64,
+    /// Area of the cut in m² at rest, of one of its sides.
+    pub area: f64,
 }
 
 impl CutReport {
@@ -243,6 +258,7 @@ impl Default for CutReport {
             tets_removed: 0,
             worst_volume_ratio: 1.0,
             dihedral: None,
+            work: None,
         }
     }
 }

@@ -332,6 +332,12 @@ impl Simulation {
             }
         }
         repaired += solved?;
+        for island in &mut self.state.islands {
+            let works = std::mem::take(&mut island.constraints.edge_work);
+            for ((stroke, _), work) in island.constraints.blades.iter().zip(works) {
+                self.state.timeline.add_work(*stroke, work);
+            }
+        }
         ms.solve = milliseconds(before_solve.elapsed());
         self.collect_contacts(&mut ms);
         self.state.residuals_kept = residual;

@@ -2,8 +2,12 @@
 //!
 //! The cut is made at the start of a frame, up to the blade's pose for that frame. During the frame the body follows: its
 //! edge moves from the pose before to this one, so it never leaves the cut. The body lies behind the edge, against the
-//! direction of motion; a blade that is drawn back keeps its direction. Cost: O(1)
-//! a frame.
+//! direction of motion; a blade that is drawn back keeps its direction.
+//!
+//! Where the blade has a toughness, the tissue decides in the frame how far the edge gets ([`crate::edge_points`]). The cut
+//! then comes a frame later: at the start of a frame it is made up to where the body ended in the frame before, through the
+//! material as that moved meanwhile. Tissue that gave before the edge has not been met and is not cut.
+//! Cost: O(1) a frame.
 
 use glam::DVec3;
 
@@ -19,6 +23,7 @@ pub(crate) struct SolidBlade {
     wedge_angle: f64,
     height: f64,
     friction: f64,
+    toughness: f64,
     /// The pose of the last frame.
     last: Option<[DVec3; 2]>,
     /// The direction of motion, once it has moved.
@@ -34,8 +39,10 @@ pub(crate) struct FrameBlade {
     pub(crate) stroke: u32,
     /// The middle of its edge at the end of the frame.
     pub(crate) point: DVec3,
-    /// The blade without particles; `None` before it has moved.
+    /// The blade without particles and edge points; `None` before it has moved.
     pub(crate) blade: Option<incise_xpbd::SolidBlade>,
+    /// Whether its cut has run ahead of its edge: more area is open than the edge has done work.
+    pub(crate) owes: bool,
 }
 
 impl SolidBlade {
@@ -62,10 +69,26 @@ impl SolidBlade {
             wedge_angle: angle.to_radians(),
             height: within(&key("height"), spec.height, 1e-9, 1e6)?,
             friction: within(&key("friction"), spec.friction, 0.0, 1e3)?,
+            toughness: within(&key("toughness"), spec.toughness, 0.0, 1e9)?,
             last: None,
             front: None,
             has_touched: false,
         })
+    }
+
+    /// Work in J that it takes to part a square meter.
+    pub(crate) fn toughness(&self) -> f64 {
+        self.toughness
+    }
+
+    /// Whether tissue resists its edge, so that cuts come a frame later.
+    pub(crate) fn is_tough(&self) -> bool {
+        self.toughness > 0.0
+    }
+
+    /// Where the body ended in the last frame.
+    pub(crate) fn last_pose(&self) -> Option<[DVec3; 2]> {
+        self.last
     }
 
     /// Notes that the blade touches what it has cut: it keeps its direction from now on.
@@ -93,12 +116,15 @@ impl SolidBlade {
             height: self.height,
             friction: self.friction,
             sides: Vec::new(),
+            toughness: self.toughness,
+            uncut: Vec::new(),
         });
         Some(FrameBlade {
             stroke,
             point: 0.5 * (a + b),
             // Turned so far that it has no front.
             blade: blade.filter(|blade| blade.check().is_ok()),
+            owes: false,
         })
     }
 }

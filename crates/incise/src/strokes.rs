@@ -1,15 +1,18 @@
 //! [`Timeline`]: the strokes of a scene, carried out frame by frame.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutOptions, StrokeRegistry, Sweep, carve, cut_level_set, cut_plane,
-    cut_surface_joining,
+    BoundaryTriangle, CutDelta, CutOptions, FaceTag, StrokeRegistry, Sweep, carve, cut_level_set,
+    cut_plane, cut_surface_joining,
 };
 use incise_mesh::ParticleId;
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
 use crate::pinned_cut::{find, meets_pinned};
+use crate::report::CutWork;
 use crate::scene::{CuttingSpec, SolidBladeSpec, StrokeSpec, pose};
 use crate::solid_blade::{FrameBlade, SolidBlade};
 use crate::tool::{MissedStroke, Tool, tool};
@@ -34,6 +37,8 @@ struct Stroke {
     solid: Option<SolidBlade>,
     /// Whether it has opened a face with a pinned corner.
     meets_pinned: bool,
+    /// Whether its blade has left and only the cut of the last frame is to be made.
+    is_closing: bool,
 }
 
 /// The strokes that are not finished.
@@ -61,6 +66,10 @@ pub(crate) struct Timeline {
     /// The blades with a body in the last frame.
     #[cfg_attr(feature = "save", serde(skip))]
     solids: Vec<FrameBlade>,
+    /// Of the strokes whose blades have a toughness: what they have parted, by number.
+    works: BTreeMap<u32, CutWork>,
+    /// Work in J of the cuts since it was taken: toughness times new area.
+    new_work: f64,
 }
 
 impl Timeline {
@@ -127,7 +136,11 @@ impl Timeline {
             has_cut: false,
             solid,
             meets_pinned: false,
+            is_closing: false,
         });
+        if self.strokes.last().is_some_and(Stroke::is_tough) {
+            self.works.insert(self.added, CutWork::default());
+        }
         self.added += 1;
         Ok(())
     }
@@ -173,6 +186,24 @@ impl Timeline {
         }
     }
 
+    /// What the blade of a stroke has parted so far; `None` without a toughness.
+    pub(crate) fn work(&self, stroke: u32) -> Option<CutWork> {
+        self.works.get(&stroke).copied()
+    }
+
+    /// Adds the work in J that the edge of a stroke's blade has done in a frame.
+    pub(crate) fn add_work(&mut self, stroke: u32, work: f64) {
+        if let Some(sum) = self.works.get_mut(&stroke) {
+            sum.work += work;
+        }
+    }
+
+    /// Toughness times new area, in J, of the cuts since the last call; `None` if there is none.
+    pub(crate) fn take_new_work(&mut self) -> Option<f64> {
+        let work = std::mem::take(&mut self.new_work);
+        (work > 0.0).then_some(work)
+    }
+
     /// Sets the blade of a live stroke for the start of the next frame.
     pub(crate) fn move_blade(&mut self, stroke: u32, pose: &[DVec3]) -> Result<(), Error> {
         let (_, field, blade) = self.live(stroke)?;
@@ -183,6 +214,11 @@ impl Timeline {
     pub(crate) fn end(&mut self, stroke: u32, islands: &[Island]) -> Result<(), Error> {
         let (place, _, blade) = self.live(stroke)?;
         if !blade.end() {
+            let closing = &mut self.strokes[place];
+            if closing.has_work_left() {
+                closing.is_closing = true;
+                return Ok(());
+            }
             let stroke = self.strokes.remove(place);
             self.events.extend(stroke.end());
             self.missed.extend(stroke.missed());
@@ -195,7 +231,9 @@ impl Timeline {
     fn live(&mut self, number: u32) -> Result<(usize, &str, &mut LiveBlade), Error> {
         let strokes = self.strokes.iter_mut().enumerate();
         let mut live = strokes.filter_map(|(place, stroke)| match &mut stroke.tool {
-            Tool::Live(blade) if stroke.options.tag == number && !blade.is_ended() => {
+            Tool::Live(blade)
+                if stroke.options.tag == number && !blade.is_ended() && !stroke.is_closing =>
+            {
                 Some((place, stroke.field.as_str(), blade))
             }
             _ => None,
@@ -328,21 +366,35 @@ impl Timeline {
                 apply_delta(g, island, &delta)?;
                 let stroke = &mut self.strokes[i];
                 stroke.meets_pinned |= meets_pinned(island, &delta, stroke.options.tag);
+                if let Some(sum) = self.works.get_mut(&stroke.options.tag) {
+                    let area = new_area(island, &delta, stroke.options.tag);
+                    sum.area += area;
+                    self.new_work += stroke.toughness() * area;
+                }
             }
         }
-        for stroke in self.strokes.iter_mut().filter(|s| s.frames[0] <= frame) {
+        let has_blade = |stroke: &&mut Stroke| stroke.frames[0] <= frame && !stroke.is_closing;
+        for stroke in self.strokes.iter_mut().filter(has_blade) {
             let pose = stroke.pose(frame);
+            let (tag, toughness) = (stroke.options.tag, stroke.toughness());
             if let (Some(solid), Some(pose)) = (&mut stroke.solid, pose) {
-                self.solids.extend(solid.advance(stroke.options.tag, &pose));
+                let done = self.works.get(&tag);
+                let owes = done.is_some_and(|done| done.work < toughness * done.area);
+                let blade = solid.advance(tag, &pose);
+                self.solids
+                    .extend(blade.map(|blade| FrameBlade { owes, ..blade }));
             }
         }
         let (events, missed) = (&mut self.events, &mut self.missed);
         let warnings = &mut self.warnings;
         self.strokes.retain_mut(|stroke| {
-            let goes_on = match &mut stroke.tool {
-                Tool::Live(blade) => blade.arrive(),
-                _ => frame < stroke.frames[1],
-            };
+            let has_blade = !stroke.is_closing
+                && match &mut stroke.tool {
+                    Tool::Live(blade) => blade.arrive(),
+                    _ => frame < stroke.frames[1],
+                };
+            stroke.is_closing = !has_blade && stroke.has_work_left();
+            let goes_on = has_blade || stroke.is_closing;
             if !goes_on {
                 events.extend(stroke.end());
                 missed.extend(stroke.missed());
@@ -376,6 +428,21 @@ impl Stroke {
     fn end(&self) -> Option<Event> {
         let stroke = self.options.tag;
         self.has_cut.then_some(Event::CutEnded { stroke })
+    }
+
+    /// Work in J that its blade needs to part a square meter.
+    fn toughness(&self) -> f64 {
+        self.solid.as_ref().map_or(0.0, SolidBlade::toughness)
+    }
+
+    /// Whether its cuts come a frame later than its blade.
+    fn is_tough(&self) -> bool {
+        self.solid.as_ref().is_some_and(SolidBlade::is_tough)
+    }
+
+    /// Whether the cut of the last frame is still to be made when its blade leaves.
+    fn has_work_left(&self) -> bool {
+        self.is_tough() && !self.is_closing && !self.sweeps.is_empty()
     }
 
     /// The pose of its blade in a frame, if it has a blade and has begun.
@@ -422,6 +489,9 @@ impl Stroke {
         let (cuttable, positions, options) =
             (&mut island.cuttable, &island.positions, &self.options);
         let sweeps = &mut self.sweeps;
+        // Tissue has decided in the last frame how far a blade with a toughness got.
+        let tough = self.solid.as_ref().filter(|solid| solid.is_tough());
+        let arrived = tough.and_then(SolidBlade::last_pose);
         let mut sweep = |pose: &[DVec3]| match sweeps.get_mut(number) {
             Some(sweep) => sweep.advance_joining(cuttable, positions, pose, registry),
             None => Sweep::new(cuttable, positions, pose, *options).map(|sweep| {
@@ -430,6 +500,9 @@ impl Stroke {
             }),
         };
         let cut = match &self.tool {
+            Tool::Sweep { .. } | Tool::Live(_) if arrived.is_some() => {
+                sweep(arrived.as_ref().map_or(&[], <[DVec3; 2]>::as_slice))
+            }
             Tool::Sweep { blade, path } => {
                 sweep(&pose(blade.iter().copied(), path, [first, last], frame))
             }
@@ -456,4 +529,20 @@ impl Stroke {
         }
         Ok(Some(delta))
     }
+}
+
+/// The area in m² at rest, of one side, that a delta of a stroke has opened.
+fn new_area(island: &Island, delta: &CutDelta, stroke: u32) -> f64 {
+    let rest = &island.cuttable.mesh().positions;
+    let area = |triangles: &[BoundaryTriangle]| {
+        let of_stroke = triangles
+            .iter()
+            .filter(|triangle| triangle.tag == FaceTag::Cut(stroke));
+        let areas = of_stroke.map(|triangle| {
+            let [a, b, c] = triangle.particles.map(|p| rest[p.index()]);
+            0.5 * (b - a).cross(c - a).length()
+        });
+        areas.sum::<f64>()
+    };
+    0.5 * (area(&delta.surface_added) - area(&delta.surface_removed))
 }

@@ -74,8 +74,8 @@ pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};
 pub use constraints::{
     AttachmentData, ContactData, ContactFactors, ContactLaw, ContactRound, ContactState,
-    DistanceConstraint, DistanceData, EdgeContact, FaceContact, FaceLimit, PairContact, SolidBlade,
-    SurfaceContact, VolumeConstraint, VolumeData,
+    DistanceConstraint, DistanceData, EdgeContact, EdgePoint, FaceContact, FaceLimit, PairContact,
+    SolidBlade, SurfaceContact, VolumeConstraint, VolumeData,
 };
 pub use device::TetData;
 pub use error::XpbdError;

@@ -141,6 +141,7 @@ impl Island {
                 volumes,
                 contacts,
                 blades: Vec::new(),
+                edge_work: Vec::new(),
             },
             forces: None,
             positions: Vec::new(),

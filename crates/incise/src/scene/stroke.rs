@@ -132,10 +132,15 @@ pub struct SolidBladeSpec {
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 1e3))]
     pub friction: f64,
+    /// Work that it takes to part a square meter of tissue: the tissue gives before the edge until the force at the edge is
+    /// this times the length of the edge in it, and then parts at this force. 0: parting takes no force.
+    #[serde(default)]
+    #[schemars(extend("unit" = "J/m²"), range(min = 0.0, max = 1e9))]
+    pub toughness: f64,
 }
 
 impl SolidBladeSpec {
-    /// A blade without friction, by its thickness and height in m and the angle of its wedge in degrees.
+    /// A blade without friction and toughness, by its thickness and height in m and the angle of its wedge in degrees.
     #[must_use]
     pub const fn new(thickness: f64, wedge_angle_degrees: f64, height: f64) -> Self {
         Self {
@@ -143,6 +148,7 @@ impl SolidBladeSpec {
             wedge_angle_degrees,
             height,
             friction: 0.0,
+            toughness: 0.0,
         }
     }
 }

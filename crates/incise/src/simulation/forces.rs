@@ -7,7 +7,7 @@ use super::Simulation;
 use super::builder::BodyHandle;
 use crate::attachment::AttachmentHandle;
 use crate::collider::{self, ColliderHandle};
-use crate::report::{Force, ForceKind, ForceReport};
+use crate::report::{CutWork, Force, ForceKind, ForceReport};
 use crate::validate::value;
 use crate::{Error, Grab};
 
@@ -178,6 +178,43 @@ impl Simulation {
             sum.torque += force.torque;
         }
         Ok(Force::new(sum, blade.point))
+    }
+
+    /// Returns what the blade of a stroke has parted so far against its toughness, also after the stroke has ended. O(log
+    /// strokes).
+    ///
+    /// # Errors
+    /// If there is no such stroke, or its blade has no toughness.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     r#"
+    ///     [[body]]
+    ///     shape = { kind = "box", tets = 500 }
+    ///     fixed = [{ half_space = { point = [0.4, 0.0, 0.0], normal = [1.0, 0.0, 0.0] } }]
+    ///     [[stroke]]
+    ///     kind = "sweep"
+    ///     frames = [0, 60]
+    ///     blade = [[-0.7, -1.0, 0.03], [-0.7, 1.0, 0.03]]
+    ///     path = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]
+    ///     solid = { thickness = 0.001, wedge_angle_degrees = 15.0, height = 0.1, toughness = 200.0 }
+    ///     "#,
+    /// )?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// for _ in 0..62 {
+    ///     simulation.step()?;
+    /// }
+    /// let parted = simulation.cut_work(0)?;
+    /// assert!(parted.area > 0.2 && parted.work > 0.9 * 200.0 * parted.area);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    pub fn cut_work(&self, stroke: u32) -> Result<CutWork, Error> {
+        let range = "the number of a stroke whose blade has a toughness";
+        let work = self.state.timeline.work(stroke);
+        work.ok_or_else(|| value("stroke", stroke, range))
     }
 
     /// Returns the mean force of the last frame from a body on what its fixed particles are fixed to, with the torque

@@ -59,7 +59,8 @@ impl Simulation {
     /// the direction in which the blade moves first; a blade that is drawn back keeps its direction.
     ///
     /// The body follows the cut: in a frame it moves from the blade's last pose to its present one. The cut itself takes no
-    /// force.
+    /// force, unless the blade has a toughness; then the tissue gives before the edge, and the cut is made a frame later, as
+    /// far as the edge has passed.
     ///
     /// # Errors
     /// Those of [`Simulation::begin_stroke`]; if the blade has more than two points or a value of its body lies outside its

@@ -200,6 +200,9 @@ impl State {
         timeline.advance(cut.number, islands, |number, island, delta| {
             dependents.apply_delta(number, island, delta, cut, ms)
         })?;
+        if let (Some(report), Some(work)) = (&mut cut.report, timeline.take_new_work()) {
+            report.work = Some(work);
+        }
         for island in islands {
             let had_blades = !island.constraints.blades.is_empty();
             island.constraints.blades = touching(island, timeline.solids());

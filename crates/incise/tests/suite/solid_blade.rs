@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use incise::cutting::FaceTag;
 use incise::mesh::glam::{DVec3, dvec3};
 use incise::mesh::kuhn_box;
-use incise::report::ForceKind;
+use incise::report::{CutWork, ForceKind};
 use incise::scene::{
     ContactSpec, Method, Precision, Quantity, ReportSpec, SolidBladeSpec, SolverSpec, StrokeSpec,
 };
@@ -286,6 +286,10 @@ fn what_knows_no_solid_blade_says_so() {
         &scene(&text.replace("= 30.0", "= 180.0")),
         "stroke[0].solid.wedge_angle_degrees",
     );
+    refused(
+        &scene(&text.replace("height = 0.2", "height = 0.2, toughness = -1.0")),
+        "stroke[0].solid.toughness",
+    );
     let bent = text.replace("blade = [", "blade = [[-1.0, -2.0, 0.0], ");
     refused(&scene(&bent), "stroke[0].solid.blade");
     refused(
@@ -308,4 +312,206 @@ fn what_knows_no_solid_blade_says_so() {
             .begin_solid_stroke(&edge(0.0), 0.1, &SOLID)
             .is_err()
     );
+}
+
+/// A thin blade whose edge the tissue resists.
+fn tough(toughness: f64) -> SolidBladeSpec {
+    SolidBladeSpec::new(0.0002, 5.0, 0.05).with(|spec| spec.toughness = toughness)
+}
+
+/// How far a tough blade moves in a frame.
+const WAY: f64 = 0.002;
+
+/// The force on a blade, and what it has parted, after each frame on its way through the loaf from x = -0.01 on.
+fn part(
+    solver: SolverSpec,
+    solid: &SolidBladeSpec,
+    snap: f64,
+) -> (Simulation, Vec<(DVec3, CutWork)>) {
+    let mut simulation = loaf(solver).build().unwrap();
+    let stroke = simulation
+        .begin_solid_stroke(&edge(-0.01), snap, solid)
+        .unwrap();
+    simulation.step().unwrap();
+    let mut frames = Vec::new();
+    for frame in 1..=95 {
+        let x = -0.01 + WAY * f64::from(frame);
+        simulation.move_blade(stroke, &edge(x)).unwrap();
+        simulation.step().unwrap();
+        let force = simulation.blade_force(stroke).unwrap().force;
+        frames.push((force, simulation.cut_work(stroke).unwrap()));
+    }
+    simulation.end_stroke(stroke).unwrap();
+    simulation.step().unwrap();
+    simulation.check().unwrap();
+    let parted = simulation.cut_work(stroke).unwrap();
+    assert!(simulation.blade_force(stroke).is_err());
+    frames.push((DVec3::ZERO, parted));
+    (simulation, frames)
+}
+
+/// At a constant speed the force on a blade is the toughness times the width of the tissue that it cuts, up to 5%, of which
+/// 2% are the wedge that holds the cut open. The work of its drive is in every frame at least what its edge does, and that is
+/// at least the toughness times the area of the cut, but for what the cut is ahead of the edge: part of a tet.
+#[test]
+fn parting_takes_the_toughness_times_the_width() {
+    for (precision, toughness, snap) in [
+        (Precision::F64, 100.0, 0.1),
+        (Precision::F64, 30.0, 0.0),
+        (Precision::F32, 60.0, 0.1),
+    ] {
+        let solid = tough(toughness);
+        let (_, frames) = part(gauss_seidel(precision), &solid, snap);
+        let width = 0.06;
+        let expected = toughness * width;
+        let steady = &frames[40..80];
+        let mean = steady.iter().map(|(force, _)| -force.x).sum::<f64>() / steady.len() as f64;
+        assert!(
+            (mean / expected - 1.0).abs() < 0.05,
+            "{mean} for {expected}"
+        );
+        let mut driven = 0.0;
+        // A row of tets.
+        let row = 0.2 / 12.0 * expected;
+        for (number, (force, parted)) in frames.iter().enumerate() {
+            driven -= force.x * WAY;
+            assert!(
+                driven >= parted.work * (1.0 - 1e-6),
+                "{number}: {driven} {parted:?}"
+            );
+            let owed = toughness * parted.area - parted.work;
+            assert!(owed < row, "{number}: {owed} of {row}");
+            assert!(owed > -2.0 * row, "{number}: {owed} of {row}");
+        }
+        let (_, last) = frames[frames.len() - 1];
+        assert!(last.area > 0.8 * 0.18 * width, "{last:?}");
+        assert!(driven > toughness * last.area, "{driven} {last:?}");
+    }
+}
+
+/// Reports have the work of the cuts of a frame, which add up to the toughness times the area.
+#[test]
+fn the_work_of_a_cut_is_reported() {
+    let mut simulation = loaf(gauss_seidel(Precision::F32)).build().unwrap();
+    let stroke = simulation
+        .begin_solid_stroke(&edge(-0.01), 0.1, &tough(100.0))
+        .unwrap();
+    simulation.step().unwrap();
+    let mut sum = 0.0;
+    for frame in 1..=60 {
+        let x = -0.01 + WAY * f64::from(frame);
+        simulation.move_blade(stroke, &edge(x)).unwrap();
+        let report = simulation.step().unwrap();
+        let work = report.cut.and_then(|cut| cut.work);
+        assert!(work.is_none_or(|work| work > 0.0));
+        sum += work.unwrap_or(0.0);
+    }
+    let parted = simulation.cut_work(stroke).unwrap();
+    assert!(sum > 0.1, "{sum}");
+    assert!((sum - 100.0 * parted.area).abs() < 1e-9 * sum);
+    // A blade without a toughness parts for nothing.
+    let free = bring_in(&mut simulation, &SOLID, 0);
+    assert!(simulation.cut_work(free).is_err());
+}
+
+/// Below the force that it takes tissue gives and is not cut; it comes back when the blade does. A softer one is cut on the
+/// same way.
+#[test]
+fn a_blade_below_the_force_indents() {
+    for (toughness, cuts) in [(1000.0, false), (30.0, true)] {
+        let solid = tough(toughness);
+        let mut simulation = loaf(gauss_seidel(Precision::F64)).build().unwrap();
+        let stroke = simulation
+            .begin_solid_stroke(&edge(-0.01), 0.1, &solid)
+            .unwrap();
+        simulation.step().unwrap();
+        let mut pushes = Vec::new();
+        for frame in 1..=17 {
+            let x = -0.01 + WAY * f64::from(frame);
+            simulation.move_blade(stroke, &edge(x)).unwrap();
+            simulation.step().unwrap();
+            pushes.push(-simulation.blade_force(stroke).unwrap().force.x);
+        }
+        let parted = simulation.cut_work(stroke).unwrap();
+        let bare = simulation.boundary().filter(|t| t.tag != FaceTag::Outer);
+        assert_eq!(bare.count() > 0, cuts);
+        assert_eq!(parted.area > 0.0, cuts, "{parted:?}");
+        if cuts {
+            continue;
+        }
+        // Where little of the edge is in a tet, it slips a little.
+        assert!(parted.work < 1e-5 * toughness * 0.06 * 0.024, "{parted:?}");
+        let last = pushes[pushes.len() - 1];
+        assert!(last > 3.0 && last < 0.5 * toughness * 0.06, "{last}");
+        assert!(
+            pushes.windows(2).all(|pair| pair[1] >= 0.8 * pair[0]),
+            "{pushes:?}"
+        );
+        // The front of the loaf, at x = 0, goes with the edge.
+        let rest = simulation.mesh().positions.iter();
+        let moved = rest.zip(simulation.positions());
+        let front = moved.filter(|(rest, _)| rest.x.abs() < 1e-9);
+        let deepest = front.map(|(_, x)| x.x).fold(0.0, f64::max);
+        assert!(deepest > 0.7 * 0.024 && deepest < 0.026, "{deepest}");
+        for frame in 1..=20 {
+            let x = 0.024 - WAY * f64::from(frame);
+            simulation.move_blade(stroke, &edge(x)).unwrap();
+            simulation.step().unwrap();
+        }
+        assert_eq!(simulation.blade_force(stroke).unwrap().force, DVec3::ZERO);
+        for _ in 0..300 {
+            simulation.step().unwrap();
+        }
+        let rest = simulation.mesh().positions.iter();
+        let away = rest
+            .zip(simulation.positions())
+            .map(|(x, y)| x.distance(*y));
+        let farthest = away.fold(0.0, f64::max);
+        assert!(farthest < 1e-3, "{farthest}");
+        simulation.check().unwrap();
+    }
+}
+
+/// A tough blade of a scene is, to the bit, one that is moved live, on any number of threads and through a snapshot; its cut
+/// is finished after it has ended.
+#[test]
+fn a_tough_stroke_continues_to_the_bit() {
+    let stroke = StrokeSpec::solid_sweep(
+        [0, 40],
+        edge(-0.01).map(|x| x.to_array()).to_vec(),
+        vec![[0.0; 3], [0.08, 0.0, 0.0]],
+        tough(100.0),
+    );
+    let mut of_scene = loaf(gauss_seidel(Precision::F32));
+    of_scene.add_stroke(stroke.clone()).threads(3);
+    let mut of_scene = of_scene.build().unwrap();
+    let mut live = loaf(gauss_seidel(Precision::F32)).build().unwrap();
+    let number = live
+        .begin_solid_stroke(&edge(-0.01), 0.1, &tough(100.0))
+        .unwrap();
+    for frame in 0..=40 {
+        live.move_blade(number, &stroke.blade_at(frame).unwrap())
+            .unwrap();
+        if frame == 40 {
+            live.end_stroke(number).unwrap();
+        }
+        if frame % 13 == 7 {
+            live = Simulation::from_snapshot(&live.snapshot().unwrap()).unwrap();
+        }
+        live.step().unwrap();
+        of_scene.step().unwrap();
+        assert_eq!(state(&live), state(&of_scene), "{frame}");
+        let [a, b] = [&live, &of_scene].map(|s| s.cut_work(number).unwrap());
+        assert_eq!(a, b);
+    }
+    let before = live.cut_work(number).unwrap();
+    assert!(live.move_blade(number, &edge(0.1)).is_err());
+    for simulation in [&mut live, &mut of_scene] {
+        for _ in 0..3 {
+            simulation.step().unwrap();
+        }
+    }
+    assert_eq!(state(&live), state(&of_scene));
+    let after = live.cut_work(number).unwrap();
+    assert!(after.work == before.work && after.area >= before.area);
 }

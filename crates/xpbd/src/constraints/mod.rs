@@ -19,7 +19,7 @@ use crate::substep::Substep;
 pub use attachments::AttachmentData;
 pub(crate) use attachments::Attachments;
 pub(crate) use blades::Blades;
-pub use blades::SolidBlade;
+pub use blades::{EdgePoint, SolidBlade};
 pub(crate) use colliders::{Colliders, Obstacle, outside};
 pub(crate) use contacts::Contacts;
 pub use contacts::{

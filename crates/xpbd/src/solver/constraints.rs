@@ -466,6 +466,8 @@ impl<R: Float> Solver<R> {
     ///     height: 0.1,
     ///     friction: 0.0,
     ///     sides: vec![(0, true), (1, false)],
+    ///     toughness: 0.0,
+    ///     uncut: Vec::new(),
     /// };
     /// solver.set_blades(vec![blade])?;
     /// solver.step(&Schedule::default(), &StepSettings { substeps: 30, ..StepSettings::new(0.016) })?;
@@ -476,7 +478,9 @@ impl<R: Float> Solver<R> {
     pub fn set_blades(&mut self, blades: Vec<SolidBlade>) -> Result<(), XpbdError> {
         for blade in &blades {
             blade.check()?;
-            for (constraint, &(particle, _)) in blade.sides.iter().enumerate() {
+            let sides = blade.sides.iter().map(|&(particle, _)| particle);
+            let uncut = blade.uncut.iter().flat_map(|point| point.particles);
+            for (constraint, particle) in sides.chain(uncut).enumerate() {
                 let particles = self.particle_count();
                 if particle as usize >= particles {
                     let source = GraphError::ParticleOutOfRange {
@@ -493,5 +497,12 @@ impl<R: Float> Solver<R> {
         }
         self.constraints.blades.set(blades);
         Ok(())
+    }
+
+    /// Returns for each solid blade the work in J that its edge has done since the blades were set to pass through uncut
+    /// tissue: force times way, of all its edge points. 0 without a toughness.
+    #[must_use]
+    pub fn blade_work(&self) -> &[f64] {
+        self.constraints.blades.work()
     }
 }

@@ -5,8 +5,8 @@ use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 use incise_mesh::{TetMesh, kuhn_box};
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Collider, ColliderShape, ContactLaw,
-    DistanceConstraint, FaceContact, Force, Forces, Integrator, Material, Method, Pose, Real,
-    SolidBlade, Solver, StepSettings, TetSolve, VbdSettings, VertexStars, VolumeConstraint,
+    DistanceConstraint, EdgePoint, FaceContact, Force, Forces, Integrator, Material, Method, Pose,
+    Real, SolidBlade, Solver, StepSettings, TetSolve, VbdSettings, VertexStars, VolumeConstraint,
     XpbdError,
 };
 
@@ -605,6 +605,8 @@ fn a_wedge_is_pressed_back_by_what_it_pushes_apart() {
             height: 0.05,
             friction: 0.0,
             sides: vec![(0, true), (1, false)],
+            toughness: 0.0,
+            uncut: Vec::new(),
         };
         x = next;
         solver.set_blades(vec![blade]).unwrap();
@@ -638,6 +640,8 @@ fn a_wedge_is_pressed_back_by_what_it_pushes_apart() {
             height: 0.05,
             friction: 0.0,
             sides: vec![(0, true), (1, false)],
+            toughness: 0.0,
+            uncut: Vec::new(),
         };
         solver.set_blades(vec![blade]).unwrap();
         solver.step(&Schedule::default(), &settings).unwrap();
@@ -670,6 +674,8 @@ fn a_sliding_blade_drags_by_friction() {
             height: 1.0,
             friction: 0.3,
             sides: vec![(0, true)],
+            toughness: 0.0,
+            uncut: Vec::new(),
         };
         solver.set_blades(vec![blade]).unwrap();
         solver.step(&Schedule::default(), &settings).unwrap();
@@ -678,6 +684,90 @@ fn a_sliding_blade_drags_by_friction() {
     // Half the thickness stretches the spring.
     within("pressure", (force.z - 50.0 * 0.01).abs(), 1e-6);
     within("friction", (force.x + 0.3 * force.z).abs(), 1e-6);
+}
+
+/// Tissue on springs gives before an edge until the springs pull by the toughness times the length of the edge; from there
+/// on the edge passes at this force, and what is lost is the force times its way. A blade that goes back is free.
+#[test]
+fn an_edge_passes_at_the_toughness_times_its_length() {
+    let (toughness, length, stiffness) = (40.0, 0.05, 25.0);
+    let limit = toughness * length;
+    for (iterations, held) in [(1, false), (20, false), (20, true)] {
+        let mut solver = Solver::<f64>::new(&[DVec3::ZERO; 4]);
+        let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+        for p in 0..4 {
+            solver.set_mass(p, 0.01);
+            solver.attach(p, handle, 1.0 / stiffness, 0.05).unwrap();
+        }
+        if held {
+            solver.set_fixed(0, true);
+        }
+        let edge = |x: f64| [dvec3(x, -0.1, 0.0), dvec3(x, 0.1, 0.0)];
+        let settings = StepSettings {
+            substeps: 20,
+            iterations,
+            ..StepSettings::new(0.01)
+        };
+        solver.measure_forces(true);
+        let shares = [0.4, 0.3, 0.2, 0.1];
+        // Force, work and place of the point after a frame.
+        let mut frame = |from: f64, to: f64| {
+            let blade = SolidBlade {
+                edge: [edge(from), edge(to)],
+                front: DVec3::X,
+                thickness: 0.001,
+                wedge_angle: 0.1,
+                height: 0.05,
+                friction: 0.0,
+                sides: Vec::new(),
+                toughness,
+                uncut: vec![EdgePoint {
+                    particles: [0, 1, 2, 3],
+                    weights: shares,
+                    along: 0.1,
+                    length,
+                }],
+            };
+            solver.set_blades(vec![blade]).unwrap();
+            solver.step(&Schedule::default(), &settings).unwrap();
+            let corners = shares.iter().enumerate();
+            let x = corners.map(|(p, share)| solver.position(p).x * share);
+            let x = x.sum::<f64>();
+            let force = solver.forces().unwrap().blades[0].force;
+            (force, solver.blade_work()[0], x)
+        };
+        let mut at = -0.01;
+        let (mut driven, mut lost) = (0.0, 0.0);
+        // Slowly: the springs stay in balance.
+        let (mut gives, mut passes) = (0, 0);
+        for number in 0..2000 {
+            let to = at + 5e-5;
+            let (force, work, x) = frame(at, to);
+            driven -= force.x * (to - at);
+            lost += work;
+            at = to;
+            assert!(
+                force.x <= 0.0 && -force.x <= limit * (1.0 + 1e-12),
+                "{force}"
+            );
+            assert_eq!([force.y, force.z], [0.0; 2]);
+            if work < 1e-6 * limit * 5e-5 && at > 0.001 {
+                assert!((x - at).abs() < 1e-9, "{number}: {x} {at}");
+                gives += 1;
+            } else if at > 0.001 && number > 1000 {
+                assert!((force.x + limit).abs() < 1e-3 * limit, "{number}: {force}");
+                assert!((work - limit * 5e-5).abs() < 0.02 * limit * 5e-5, "{work}");
+                passes += 1;
+            }
+        }
+        assert!(gives > 100 && passes > 100, "{gives} {passes}");
+        assert!(lost > 0.0 && driven > lost, "{driven} {lost}");
+        for _ in 0..10 {
+            let (force, work, _) = frame(at, at - 0.1);
+            assert_eq!((force, work), (DVec3::ZERO, 0.0));
+            at -= 0.1;
+        }
+    }
 }
 
 #[test]
@@ -691,6 +781,8 @@ fn blades_are_refused_by_what_is_wrong_and_by_vbd() {
         height: 0.1,
         friction: 0.0,
         sides: vec![(0, true)],
+        toughness: 0.0,
+        uncut: Vec::new(),
     };
     solver.set_blades(vec![good.clone()]).unwrap();
     let mut settings = VbdSettings::new(0.01, 1);
@@ -721,6 +813,28 @@ fn blades_are_refused_by_what_is_wrong_and_by_vbd() {
         },
         SolidBlade {
             sides: vec![(9999, true)],
+            ..good.clone()
+        },
+        SolidBlade {
+            toughness: -1.0,
+            ..good.clone()
+        },
+        SolidBlade {
+            uncut: vec![EdgePoint {
+                particles: [0, 1, 2, 9999],
+                weights: [0.25; 4],
+                along: 0.0,
+                length: 0.1,
+            }],
+            ..good.clone()
+        },
+        SolidBlade {
+            uncut: vec![EdgePoint {
+                particles: [0, 1, 2, 3],
+                weights: [0.25; 4],
+                along: f64::NAN,
+                length: 0.1,
+            }],
             ..good.clone()
         },
     ] {

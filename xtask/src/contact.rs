@@ -1,0 +1,373 @@
+//! `cargo xtask contact`: what contact costs and how deep it gets, beside the figures that it aims at.
+//!
+//! Costs: a liver that is cut in two, with contact and without, frame by frame in turn, so that other load of the machine
+//! affects both alike. The share of contact is what the frame takes longer, the solver's passes included. The two run over
+//! the same tets but not over the same motion, because without contact the parts pass through each other.
+//!
+//! Depths: stacks of cubes, and a pile of organs in a box, in percent of the mean edge.
+
+use incise::mesh::glam::{DVec3, dvec3};
+use incise::mesh::kuhn_box;
+use incise::meshing::{Shape, generate};
+use incise::scene::{ColliderSpec, ContactSpec, Method, Precision, SolverSpec, StrokeSpec};
+use incise::{Body, FrameReport, Simulation, SimulationBuilder};
+use serde::{Deserialize, Serialize};
+
+use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table, median};
+
+/// Substeps of a frame of the liver.
+const SUBSTEPS: u32 = 30;
+/// Tets of the liver.
+const TETS: usize = 11_000;
+/// Largest share of a frame that pairs across a fresh cut should take, and that all contact should.
+const SHARES: [f64; 2] = [0.05, 0.25];
+/// Largest depth in mean edges of a body at rest on itself, of a stack, and of a pile.
+const DEPTHS: [f64; 3] = [0.01, 0.001, 0.1];
+
+/// A measurement.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+enum Row {
+    Cost(Cost),
+    Depth(Depth),
+}
+
+/// What contact costs in a scene.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Cost {
+    scene: String,
+    threads: usize,
+    tets: usize,
+    candidates: usize,
+    active: usize,
+    colors: usize,
+    /// Median of a frame without contact and with it, in ms.
+    ms: [f64; 2],
+    /// Median of what finding and coloring takes, in ms.
+    find_ms: f64,
+    /// The frame of the cut, without contact and with it, in ms.
+    cut_ms: [f64; 2],
+    /// The slowest frame of all with contact, in ms.
+    worst_ms: f64,
+    /// Largest depth of the measured frames, and the largest 99th percentile, in mean edges.
+    depths: [f64; 2],
+    buried: usize,
+}
+
+impl Cost {
+    fn share(&self) -> f64 {
+        1.0 - self.ms[0] / self.ms[1]
+    }
+}
+
+/// How deep bodies at rest are in each other.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Depth {
+    scene: String,
+    tets: usize,
+    active: usize,
+    /// Largest depth of the last frames, and the largest 99th percentile, in mean edges.
+    depths: [f64; 2],
+    /// Largest depth before, in mean edges.
+    deepest: f64,
+    buried: usize,
+    repaired: usize,
+}
+
+/// Measures and writes the page.
+pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    let quick = arguments.quick;
+    let all = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut threads = vec![1, all];
+    threads.dedup();
+    let mut cells = Vec::new();
+    for threads in threads {
+        for lies in [false, true] {
+            let id = format!("{}-{threads}", if lies { "lies" } else { "pairs" });
+            cells.push(Cell::new(id, move || {
+                cost(lies, threads, quick).map(Row::Cost)
+            }));
+        }
+    }
+    for count in [2, 5, 10] {
+        cells.push(Cell::new(format!("stack-{count}"), move || {
+            let name = format!("stack of {count} cubes");
+            let frames = if quick { [5, 3] } else { [60 + 20 * count, 30] };
+            depth(&name, stack(count), frames).map(Row::Depth)
+        }));
+    }
+    cells.push(Cell::new("pile", move || {
+        let (tets, frames) = if quick {
+            (200, [5, 3])
+        } else {
+            (1_000, [200, 30])
+        };
+        depth("eight organs in a box", pile(tets)?, frames).map(Row::Depth)
+    }));
+    let experiment = Experiment {
+        name: "contact",
+        cells,
+        page,
+    };
+    experiment.run(arguments)
+}
+
+fn solver(substeps: u32) -> SolverSpec {
+    SolverSpec::default().with(|spec| {
+        spec.precision = Precision::F32;
+        spec.substeps = substeps.into();
+        spec.method = Method::GaussSeidel;
+    })
+}
+
+/// A liver of 25 cm that a plane cuts: lying on the ground with one part on the other, or at rest without a load.
+fn liver(lies: bool, tets: usize, contact: bool) -> anyhow::Result<SimulationBuilder> {
+    let mut builder = Simulation::builder();
+    builder.solver(solver(SUBSTEPS));
+    let body = Body::new(generate(Shape::Liver, tets)?).scale(0.25);
+    builder.add_body(body.young_modulus(3e4).density(1050.0).damping(0.005));
+    if lies {
+        builder.gravity(DVec3::NEG_Z * 9.81).ground(-0.1, 0.8);
+    }
+    if contact {
+        builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
+    }
+    let frame = if lies { 40 } else { 4 };
+    let height = if lies { -0.05 } else { 0.0 };
+    let plane = StrokeSpec::plane(frame, [0.0, 0.0, height], [0.1, 0.05, 1.0]);
+    builder.add_stroke(plane);
+    Ok(builder)
+}
+
+/// Runs a liver with contact and without in turn.
+fn cost(lies: bool, threads: usize, quick: bool) -> anyhow::Result<Cost> {
+    let tets = if quick { 500 } else { TETS };
+    let (settle, measured) = match (lies, quick) {
+        (_, true) => (45, 3),
+        (true, false) => (120, 60),
+        (false, false) => (8, 60),
+    };
+    let mut both = Vec::new();
+    for contact in [false, true] {
+        let mut builder = liver(lies, tets, contact)?;
+        builder.threads(threads);
+        both.push((builder.build()?, Vec::<FrameReport>::new()));
+    }
+    for _ in 0..settle + measured {
+        for (simulation, reports) in &mut both {
+            reports.push(simulation.step()?.clone());
+        }
+    }
+    let cut_ms = [0, 1].map(|run| {
+        let cuts = both[run].1.iter().filter(|report| report.cut.is_some());
+        cuts.map(|report| report.ms.total).fold(0.0, f64::max)
+    });
+    let ms = [0, 1].map(|run| median(both[run].1[settle..].iter().map(|report| report.ms.total)));
+    let with = &both[1].1;
+    let last = &with[settle..];
+    let contacts = || last.iter().filter_map(|report| report.contact);
+    let most = |of: fn(&incise::report::ContactReport) -> f64| {
+        contacts().map(|contact| of(&contact)).fold(0.0, f64::max)
+    };
+    let end = contacts().next_back().unwrap_or_default();
+    Ok(Cost {
+        scene: if lies {
+            "upper part lies on the lower".to_owned()
+        } else {
+            "fresh cut without load".to_owned()
+        },
+        threads,
+        tets: both[1].0.mesh().tets.len(),
+        candidates: end.candidates,
+        active: end.active,
+        colors: end.colors,
+        ms,
+        find_ms: median(last.iter().map(|report| report.ms.contact)),
+        cut_ms,
+        worst_ms: with
+            .iter()
+            .map(|report| report.ms.total)
+            .fold(0.0, f64::max),
+        depths: [most(|c| c.max_depth), most(|c| c.depth_p99)],
+        buried: end.buried,
+    })
+}
+
+/// Cubes on each other, each shifted by a third of a cell against the one below.
+fn stack(count: u32) -> SimulationBuilder {
+    const EDGE: f64 = 0.25;
+    let mut builder = Simulation::builder();
+    builder
+        .gravity(DVec3::NEG_Z * 9.81)
+        .ground(0.0, 0.5)
+        .solver(solver(60));
+    for number in 0..count {
+        let shift = if number % 2 == 1 { EDGE / 6.0 } else { 0.0 };
+        let at = dvec3(shift, 0.5 * shift, EDGE * f64::from(number));
+        let cube = Body::new(kuhn_box([2; 3], DVec3::splat(EDGE))).position(at);
+        builder.add_body(cube.young_modulus(2e7).damping(0.005));
+    }
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
+    builder
+}
+
+/// Eight livers of 10 cm that fall into a box, in two layers.
+fn pile(tets: usize) -> anyhow::Result<SimulationBuilder> {
+    let mut builder = Simulation::builder();
+    builder
+        .gravity(DVec3::NEG_Z * 9.81)
+        .ground(0.0, 0.5)
+        .solver(solver(SUBSTEPS));
+    let mesh = generate(Shape::Liver, tets)?;
+    for number in 0..8_u32 {
+        let [x, y, z] = [number & 1, number >> 1 & 1, number >> 2].map(f64::from);
+        let at = dvec3(0.1 * (x - 0.5), 0.1 * (y - 0.5), 0.06 + 0.11 * z + 0.01 * x);
+        let body = Body::new(mesh.clone()).scale(0.1).position(at);
+        builder.add_body(body.young_modulus(2e4).density(1050.0).damping(0.005));
+    }
+    for [x, y] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
+        let wall = ColliderSpec::plane([-0.11 * x, -0.11 * y, 0.0], [x, y, 0.0]);
+        builder.add_collider(wall.with_friction(0.2));
+    }
+    builder.contact(ContactSpec::default());
+    Ok(builder)
+}
+
+/// Runs a scene and looks at its last frames.
+fn depth(name: &str, builder: SimulationBuilder, frames: [u32; 2]) -> anyhow::Result<Depth> {
+    let mut simulation = builder.build()?;
+    let mut reports = Vec::new();
+    for _ in 0..frames[0] + frames[1] {
+        reports.push(simulation.step()?.clone());
+    }
+    let (before, last) = reports.split_at(frames[0] as usize);
+    let most = |reports: &[FrameReport], of: fn(&incise::report::ContactReport) -> f64| {
+        let contacts = reports.iter().filter_map(|report| report.contact);
+        contacts.map(|contact| of(&contact)).fold(0.0, f64::max)
+    };
+    let end = simulation.report().contact.unwrap_or_default();
+    Ok(Depth {
+        scene: name.to_owned(),
+        tets: simulation.mesh().tets.len(),
+        active: end.active,
+        depths: [most(last, |c| c.max_depth), most(last, |c| c.depth_p99)],
+        deepest: most(before, |c| c.max_depth),
+        buried: end.buried,
+        repaired: reports.iter().map(|report| report.repaired).sum(),
+    })
+}
+
+/// A figure beside its aim.
+fn beside(figure: f64, aim: f64, decimals: usize) -> String {
+    let verdict = if figure <= aim { "reached" } else { "missed" };
+    format!(
+        "{:.decimals$}% (aim {}%): {verdict}",
+        100.0 * figure,
+        100.0 * aim
+    )
+}
+
+fn page(rows: &[Row]) -> anyhow::Result<Page> {
+    let mut costs = Table::new(
+        format!("Cost of contact: a liver cut in two, {SUBSTEPS} substeps, f32, median frame"),
+        [
+            "scene",
+            "threads",
+            "tets",
+            "candidates",
+            "active",
+            "colors",
+            "ms without",
+            "ms with",
+            "of these finding",
+            "share of contact",
+            "ms of the frame of the cut, without and with",
+            "slowest frame",
+        ],
+    );
+    let mut depths = Table::new(
+        "Depth at rest, in mean edges of the surface",
+        [
+            "scene",
+            "tets",
+            "active",
+            "largest depth",
+            "99% of the contacts below",
+            "largest on the way there",
+            "buried",
+            "repaired",
+        ],
+    );
+    for row in rows {
+        match row {
+            Row::Cost(cost) => {
+                let lies = cost.scene.starts_with("upper");
+                costs.push([
+                    cost.scene.clone(),
+                    cost.threads.to_string(),
+                    cost.tets.to_string(),
+                    cost.candidates.to_string(),
+                    cost.active.to_string(),
+                    cost.colors.to_string(),
+                    format!("{:.2}", cost.ms[0]),
+                    format!("{:.2}", cost.ms[1]),
+                    format!("{:.2}", cost.find_ms),
+                    beside(cost.share(), SHARES[usize::from(lies)], 1),
+                    format!("{:.1}, {:.1}", cost.cut_ms[0], cost.cut_ms[1]),
+                    format!("{:.1}", cost.worst_ms),
+                ]);
+                if lies && cost.threads == 1 {
+                    depths.push([
+                        "liver, upper part on the lower".to_owned(),
+                        cost.tets.to_string(),
+                        cost.active.to_string(),
+                        beside(cost.depths[0], DEPTHS[0], 3),
+                        format!("{:.3}%", 100.0 * cost.depths[1]),
+                        "-".to_owned(),
+                        cost.buried.to_string(),
+                        "-".to_owned(),
+                    ]);
+                }
+            }
+            Row::Depth(depth) => {
+                let aim = DEPTHS[if depth.scene.starts_with("stack") {
+                    1
+                } else {
+                    2
+                }];
+                depths.push([
+                    depth.scene.clone(),
+                    depth.tets.to_string(),
+                    depth.active.to_string(),
+                    beside(depth.depths[0], aim, 3),
+                    format!("{:.3}%", 100.0 * depth.depths[1]),
+                    format!("{:.1}%", 100.0 * depth.deepest),
+                    depth.buried.to_string(),
+                    depth.repaired.to_string(),
+                ]);
+            }
+        }
+    }
+    Ok(Page {
+        title: "Contact".to_owned(),
+        parts: vec![
+            Part::Text(INTRODUCTION.to_owned()),
+            Part::Table(costs),
+            Part::Text(COSTS.to_owned()),
+            Part::Table(depths),
+            Part::Text(PEERS.to_owned()),
+        ],
+    })
+}
+
+const INTRODUCTION: &str = "What contact costs and how deep bodies get into each other, beside what is aimed at. Costs are \
+of runs with contact and without in turn, frame by frame. Without contact the parts pass through each other, so the two \
+do not move alike; the solver's work a tet does not depend on the motion. In the fresh cut all contacts are pairs of \
+particles across it; on the ground most are vertices near triangles.";
+
+const COSTS: &str = "The share has all that a frame takes longer: finding and coloring (once a frame), and the passes of \
+the solver over the contacts (once a substep). Time by stage of the search is in `cargo bench --bench contact`. A scene \
+without `[contact]` is a row of [the overhead page](overhead.md).";
+
+const PEERS: &str = "The aims: 0.1% of an edge in a stack, 1% in a body at rest on itself, 10% in a pile of organs. No \
+other system that was found states depth as a part of an edge. Two have stacks and piles of soft bodies of their own \
+(pbatoolkit, Newton); they are Python packages that this command does not install, so they have no rows.";
