@@ -71,13 +71,26 @@ pub(crate) struct DegradationArguments {
     out: Option<PathBuf>,
 }
 
-/// Frames per stroke.
+/// Frames of a stroke.
 const FRAMES: u64 = 5;
+/// Frames from the start of a crossing stroke to that of the next one, as between strokes of a hand.
+const CROSSING_FRAMES: u64 = 20;
 /// Number of parts of the run; each has a row.
 const PARTS: u64 = 4;
 /// Depth of a stroke and its length, as fractions of the largest extent of the body.
 const DEPTH: f64 = 0.12;
 const LENGTH: f64 = 0.15;
+
+impl DegradationArguments {
+    /// Frames from the start of a stroke to that of the next one.
+    fn period(&self) -> u64 {
+        if self.crossing {
+            CROSSING_FRAMES
+        } else {
+            FRAMES
+        }
+    }
+}
 
 /// One way to maintain the partition, with its history.
 struct Run {
@@ -111,7 +124,7 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
         std::fs::write(path, scene.to_toml()?)?;
         return Ok(());
     }
-    let frames = FRAMES * arguments.strokes;
+    let frames = arguments.period() * arguments.strokes;
     let mut text = format!(
         "## {}, {} {}strokes, {} thread(s)\n",
         model.name,
@@ -130,7 +143,7 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
                 }
             }
         }
-        writeln!(text, "\n{}", course(&runs, frames))?;
+        writeln!(text, "\n{}", course(&runs, arguments))?;
         writeln!(text, "\n{}", costs(&runs))?;
         for run in &runs {
             run.simulation.check()?;
@@ -229,7 +242,7 @@ fn crossing_strokes(mesh: &TetMesh, scale: f64, strokes: u64, snap: f64) -> Vec<
         let path = direction().normalize_or(DVec3::Y) * 3.0 * edge;
         let array = |x: DVec3| (x * scale).to_array();
         StrokeSpec::Sweep {
-            frames: [FRAMES * i, FRAMES * i + FRAMES - 1],
+            frames: [CROSSING_FRAMES * i, CROSSING_FRAMES * i + FRAMES - 1],
             blade: vec![array(center - along - path), array(center + along - path)],
             path: vec![[0.0; 3], array(2.0 * path)],
             snap,
@@ -346,7 +359,8 @@ fn fresh_plan(mesh: &TetMesh) -> anyhow::Result<[usize; 2]> {
 }
 
 /// Clusters, colors and the solve time after each part of the strokes.
-fn course(runs: &[Run], frames: u64) -> Table {
+fn course(runs: &[Run], arguments: &DegradationArguments) -> Table {
+    let frames = arguments.period() * arguments.strokes;
     let mut table = table([
         "strokes",
         "",
@@ -374,7 +388,7 @@ fn course(runs: &[Run], frames: u64) -> Table {
             let ms = median(quiet.map(|report| report.ms.solve));
             let first = *first.get_or_insert(ms);
             table.add_row([
-                (frames * part / PARTS / FRAMES).to_string(),
+                (arguments.strokes * part / PARTS).to_string(),
                 run.name.to_owned(),
                 last.tets.to_string(),
                 last.clusters.to_string(),
@@ -395,7 +409,7 @@ const THIN: f64 = 5.0;
 /// Cosine between the normals of neighboring boundary triangles below which their edge is a fold.
 const FOLD: f64 = 0.8;
 /// Half the extent of the region around the middle of the body in which crossing strokes have their centers, in extents.
-const SPREAD: f64 = 0.3;
+const SPREAD: f64 = 0.08;
 
 /// A body under strokes.
 struct Shaped {
@@ -456,7 +470,8 @@ fn shapes(model: &Model, arguments: &DegradationArguments) -> anyhow::Result<Tab
     ]);
     for part in 1..=PARTS {
         let mut uncut_times = Vec::new();
-        for _ in FRAMES * strokes * (part - 1) / PARTS..FRAMES * strokes * part / PARTS {
+        let end = |part| arguments.period() * strokes * part / PARTS;
+        for _ in end(part - 1)..end(part) {
             uncut_times.push(uncut.step()?.ms.total);
             for run in &mut runs {
                 let report = run.simulation.step()?;
