@@ -61,31 +61,28 @@ fn scene(case: &Case, path: PathBuf) -> Scene {
     body.shape = None;
     body.mesh = Some(path);
     body.scale = scale(case);
-    body.fixed = vec![Region::HalfSpace {
-        point: (case.at([0.2, 0.5, 0.5]) * scale(case)).to_array(),
-        normal: [-1.0, 0.0, 0.0],
-    }];
+    body.fixed = vec![Region::half_space(
+        (case.at([0.2, 0.5, 0.5]) * scale(case)).to_array(),
+        [-1.0, 0.0, 0.0],
+    )];
     scene
 }
 
 fn plane(case: &Case) -> StrokeSpec {
-    StrokeSpec::Plane {
-        frame: 1,
-        point: (case.at([0.48, 0.5, 0.5]) * scale(case)).to_array(),
-        normal: [1.0, 0.03, 0.02],
-        snap: 0.1,
-    }
+    StrokeSpec::plane(
+        1,
+        (case.at([0.48, 0.5, 0.5]) * scale(case)).to_array(),
+        [1.0, 0.03, 0.02],
+    )
 }
 
 /// A stroke that starts just above the middle of the body, as if it had come from above.
 fn sweep(case: &Case) -> StrokeSpec {
     let scale = scale(case);
     let [start, end] = [0.5, -9.5].map(|frames| case.blade(frames));
-    StrokeSpec::Sweep {
-        frames: [0, 10],
-        blade: start.map(|x| (x * scale).to_array()).to_vec(),
-        path: vec![[0.0; 3], ((end[0] - start[0]) * scale).to_array()],
-        snap: 0.1,
-        solid: None,
-    }
+    StrokeSpec::sweep(
+        [0, 10],
+        start.map(|x| (x * scale).to_array()).to_vec(),
+        vec![[0.0; 3], ((end[0] - start[0]) * scale).to_array()],
+    )
 }

@@ -145,13 +145,11 @@ impl Cost {
         scene.solver.iterations = 20;
         let scale = scene.body[0].scale;
         let (blade, way) = stroke(&model.mesh);
-        scene.stroke = vec![StrokeSpec::Sweep {
-            frames: [1, 1 + u64::from(frames)],
-            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
-            path: vec![[0.0; 3], (way * scale).to_array()],
-            snap: 0.1,
-            solid: None,
-        }];
+        scene.stroke = vec![StrokeSpec::sweep(
+            [1, 1 + u64::from(frames)],
+            blade.map(|x| (x * scale).to_array()).to_vec(),
+            vec![[0.0; 3], (way * scale).to_array()],
+        )];
         let mut simulation = Simulation::with_threads(&scene, 1)?;
         let (mut sums, mut cut_tets) = ([0.0; 4], 0);
         let (mut solves, mut follows) = (Vec::new(), Vec::new());

@@ -177,10 +177,10 @@ fn scene_at_rest(model: &Model, arguments: &DegradationArguments, snap: f64) -> 
 fn runs(model: &Model, arguments: &DegradationArguments) -> anyhow::Result<Vec<Run>> {
     let mut scene = scene_at_rest(model, arguments, 0.1);
     let mut runs = Vec::new();
-    let renewing = Some(ReclusterSpec {
-        threshold: 1.25,
-        frames: NonZeroU32::MIN.saturating_add(9),
-    });
+    let renewing = Some(ReclusterSpec::default().with(|spec| {
+        spec.threshold = 1.25;
+        spec.frames = NonZeroU32::MIN.saturating_add(9);
+    }));
     for (name, merges, recluster) in [
         ("no merging", false, None),
         ("merging", true, None),
@@ -217,13 +217,12 @@ fn small_strokes(mesh: &TetMesh, scale: f64, strokes: u64, snap: f64) -> Vec<Str
             middle + 0.2 * DEPTH * size * normal,
             middle - DEPTH * size * normal,
         ];
-        StrokeSpec::Sweep {
-            frames: [FRAMES * i, FRAMES * i + FRAMES - 1],
-            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
-            path: vec![[0.0; 3], (along * scale).to_array()],
-            snap,
-            solid: None,
-        }
+        StrokeSpec::sweep(
+            [FRAMES * i, FRAMES * i + FRAMES - 1],
+            blade.map(|x| (x * scale).to_array()).to_vec(),
+            vec![[0.0; 3], (along * scale).to_array()],
+        )
+        .with_snap(snap)
     };
     (0..strokes).map(stroke).collect()
 }
@@ -241,13 +240,12 @@ fn crossing_strokes(mesh: &TetMesh, scale: f64, strokes: u64, snap: f64) -> Vec<
         let along = direction().normalize_or(DVec3::X) * 3.0 * edge;
         let path = direction().normalize_or(DVec3::Y) * 3.0 * edge;
         let array = |x: DVec3| (x * scale).to_array();
-        StrokeSpec::Sweep {
-            frames: [CROSSING_FRAMES * i, CROSSING_FRAMES * i + FRAMES - 1],
-            blade: vec![array(center - along - path), array(center + along - path)],
-            path: vec![[0.0; 3], array(2.0 * path)],
-            snap,
-            solid: None,
-        }
+        StrokeSpec::sweep(
+            [CROSSING_FRAMES * i, CROSSING_FRAMES * i + FRAMES - 1],
+            vec![array(center - along - path), array(center + along - path)],
+            vec![[0.0; 3], array(2.0 * path)],
+        )
+        .with_snap(snap)
     };
     (0..strokes).map(stroke).collect()
 }

@@ -53,13 +53,7 @@ impl Model {
     pub(crate) fn put_into(&self, body: &mut BodySpec) {
         (body.mesh, body.shape) = match &self.source {
             Source::File(path) => (Some(path.clone()), None),
-            Source::Shape(shape, tets) => (
-                None,
-                Some(ShapeSpec {
-                    kind: shape.to_string(),
-                    tets: *tets,
-                }),
-            ),
+            Source::Shape(shape, tets) => (None, Some(ShapeSpec::new(shape.to_string(), *tets))),
         };
     }
 }

@@ -209,10 +209,10 @@ fn scene(model: &Model, plain: bool, random: &mut Random) -> Scene {
     let body: &mut BodySpec = &mut scene.body[0];
     body.young_modulus = 2e4;
     scene.solver.precision = [Precision::F32, Precision::F64][random.below(2)];
-    scene.world.ground = Some(incise::scene::GroundSpec {
-        height: -1.0,
-        friction: 0.5,
-    });
+    scene.world.ground = Some(incise::scene::GroundSpec::default().with(|spec| {
+        spec.height = -1.0;
+        spec.friction = 0.5;
+    }));
     scene
 }
 
@@ -231,13 +231,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
     let array = DVec3::to_array;
     let (frame, snap) = (0, [0.0, 0.05, 0.1, 0.1, 0.1, 0.2][random.below(6)]);
     match random.below(12) {
-        0..=3 => StrokeSpec::Rectangle {
-            frame,
-            center: array(&center),
-            half_u: array(&u),
-            half_v: array(&v),
-            snap,
-        },
+        0..=3 => StrokeSpec::rectangle(frame, array(&center), array(&u), array(&v)).with_snap(snap),
         4 | 5 => {
             // A strip of two bays, bent at the middle.
             let bend = normal * size * random.unit();
@@ -245,28 +239,17 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
             let points = rows
                 .iter()
                 .flat_map(|row| [array(&(*row - u)), array(&(*row + u))]);
-            StrokeSpec::Surface {
+            StrokeSpec::surface(
                 frame,
-                points: points.collect(),
-                triangles: vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
-                snap,
-            }
+                points.collect(),
+                vec![[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]],
+            )
+            .with_snap(snap)
         }
-        6 => StrokeSpec::Punch {
-            frame,
-            region: Region::Sphere {
-                center: array(&center),
-                radius: size,
-            },
-            snap,
-        },
-        7 if random.below(8) == 0 => StrokeSpec::Remove {
-            frame,
-            region: Region::Sphere {
-                center: array(&center),
-                radius: 0.5 * size,
-            },
-        },
+        6 => StrokeSpec::punch(frame, Region::sphere(array(&center), size)).with_snap(snap),
+        7 if random.below(8) == 0 => {
+            StrokeSpec::remove(frame, Region::sphere(array(&center), 0.5 * size))
+        }
         10 => {
             // Rows that overlap, to and fro.
             let across = |row: i32| 0.4 * f64::from(row) * u;
@@ -277,36 +260,33 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
                     array(&(across(row) + sign * v)),
                 ]
             });
-            StrokeSpec::Sweep {
-                frames: [0, 10 + random.below(10) as u64],
-                blade: vec![array(&(center - 0.35 * u)), array(&(center + 0.35 * u))],
-                path: rows.collect(),
-                snap,
-                solid: None,
-            }
+            StrokeSpec::sweep(
+                [0, 10 + random.below(10) as u64],
+                vec![array(&(center - 0.35 * u)), array(&(center + 0.35 * u))],
+                rows.collect(),
+            )
+            .with_snap(snap)
         }
         11 => {
             // A loop across its own path.
             let n = normal * size * 0.4;
             let path = [-v - n, v + n, v - n, -v + n, -v - n];
-            StrokeSpec::Sweep {
-                frames: [0, 5 + random.below(10) as u64],
-                blade: vec![array(&(center - u)), array(&(center + u))],
-                path: path.iter().map(array).collect(),
-                snap,
-                solid: None,
-            }
+            StrokeSpec::sweep(
+                [0, 5 + random.below(10) as u64],
+                vec![array(&(center - u)), array(&(center + u))],
+                path.iter().map(array).collect(),
+            )
+            .with_snap(snap)
         }
         _ => {
             let frames = 2 + random.below(6) as u64;
             let middle = center + normal * size * 0.3;
-            StrokeSpec::Sweep {
-                frames: [0, frames],
-                blade: vec![array(&(middle - u)), array(&(middle + u))],
-                path: vec![array(&-v), array(&(normal * size * 0.2)), array(&v)],
-                snap,
-                solid: None,
-            }
+            StrokeSpec::sweep(
+                [0, frames],
+                vec![array(&(middle - u)), array(&(middle + u))],
+                vec![array(&-v), array(&(normal * size * 0.2)), array(&v)],
+            )
+            .with_snap(snap)
         }
     }
 }
@@ -327,6 +307,7 @@ fn beside(mut stroke: StrokeSpec, simulation: &Simulation, random: &mut Random) 
                 shift(center);
             }
         }
+        _ => unreachable!("random strokes are of these kinds"),
     }
     stroke
 }
@@ -340,6 +321,7 @@ fn due(mut stroke: StrokeSpec, now: u64) -> StrokeSpec {
         | StrokeSpec::Punch { frame, .. }
         | StrokeSpec::Remove { frame, .. } => *frame = now,
         StrokeSpec::Sweep { frames, .. } => *frames = [now, now + frames[1] - frames[0]],
+        _ => unreachable!("random strokes are of these kinds"),
     }
     stroke
 }

@@ -13,11 +13,9 @@ use crate::run::{load, located};
 
 pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let scene = load(arguments.scene.as_deref())?;
-    let question = AdviseSettings {
-        budget_ms: arguments.budget_ms,
-        frames: arguments.frames.unwrap_or_else(|| default_frames(&scene)),
-        threads: arguments.threads.map(usize::from),
-    };
+    let frames = arguments.frames.unwrap_or_else(|| default_frames(&scene));
+    let mut question = AdviseSettings::new(arguments.budget_ms, frames);
+    question.threads = arguments.threads.map(usize::from);
     let advice = incise::advise::advise(&scene, &question);
     let advice = advice.map_err(|error| located(error, arguments.scene.as_deref()))?;
     if arguments.json {
@@ -49,6 +47,7 @@ fn reference(advice: &Advice) -> String {
         steps: [a, b, c],
         order,
         left,
+        ..
     } = &advice.reference;
     let mut text = format!(
         "{} tets, {} frames; errors are measured against ",
@@ -61,6 +60,7 @@ fn reference(advice: &Advice) -> String {
         ReferenceKind::Xpbd => format!(
             "the solver itself in double precision with {c} substeps a frame ({a} and {b} for its error)"
         ),
+        _ => format!("references of {a}, {b} and {c} steps a frame"),
     };
     if let Some(order) = order {
         text += &format!(" (order {order:.1})");

@@ -30,12 +30,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         .ground(-0.3, 0.5);
     builder.add_body(Body::new(bar(12)).young_modulus(5e5).pinned(|x| x.x == 0.0));
     let mut simulation = builder.build()?;
-    let ball = simulation.add_collider(&ColliderSpec::Sphere {
-        center: [0.9, 0.05, 0.4],
-        radius: 0.1,
-        friction: 0.3,
-        velocity: [0.0; 3],
-    })?;
+    let ball =
+        simulation.add_collider(&ColliderSpec::sphere([0.9, 0.05, 0.4], 0.1).with_friction(0.3))?;
 
     // What a renderer keeps: an index buffer updated by cuts, and vertices updated from the particles.
     let mut skin = Skin::new(simulation.boundary());

@@ -14,10 +14,8 @@ const STRONGEST: f64 = 3.0;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut builder = Simulation::builder();
-    builder.report(ReportSpec {
-        quantities: vec![Quantity::Force], // asks for forces; without it they cost nothing
-        ..ReportSpec::default()
-    });
+    // Asks for forces; without it they cost nothing.
+    builder.report(ReportSpec::default().with(|spec| spec.quantities = vec![Quantity::Force]));
     // A block of 10 cm, as soft as a liver, glued to a table.
     let block = Body::new(generate(Shape::Box, 1500)?).scale(0.1);
     let block = builder.add_body(
@@ -28,12 +26,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     let mut simulation = builder.build()?;
     let probe = |z: f64| DVec3::new(0.02, 0.0, z);
-    let ball = simulation.add_collider(&ColliderSpec::Sphere {
-        center: probe(0.077).to_array(),
-        radius: 0.025,
-        friction: 0.2,
-        velocity: [0.0; 3],
-    })?;
+    let ball = simulation
+        .add_collider(&ColliderSpec::sphere(probe(0.077).to_array(), 0.025).with_friction(0.2))?;
 
     let top = DVec3::new(-0.03, 0.0, 0.05);
     let grab = simulation

@@ -8,7 +8,7 @@
 //! use incise::{Scene, Simulation};
 //!
 //! let mut scene = Scene::built_in(); // a liver, sliced by a moving blade
-//! # scene.body[0].shape = Some(incise::scene::ShapeSpec { kind: "liver".into(), tets: 1000 });
+//! # scene.body[0].shape = Some(incise::scene::ShapeSpec::new("liver", 1000));
 //! let mut simulation = Simulation::new(&scene)?;
 //! for _ in 0..3 {
 //!     let report = simulation.step()?;

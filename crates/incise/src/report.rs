@@ -177,6 +177,7 @@ pub struct BodyReport {
 
 /// Counts and quality of the cuts of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct CutReport {
     /// Number of tets that were cut.
     pub tets_cut: usize,
@@ -284,6 +285,7 @@ pub struct PieceReport {
 
 /// Wall time by stage in ms; 0 for stages that did not run.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Milliseconds {
     /// Cutting the mesh, updating its pieces, and applying the cut to the solver.
     pub cut: f64,
@@ -469,6 +471,7 @@ pub struct ForceReport {
 
 /// Energies in J.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct EnergyReport {
     /// Kinetic energy.
     pub kinetic: f64,
@@ -480,6 +483,7 @@ pub struct EnergyReport {
 
 /// Tets that `kappa_limit` has made softer than their material.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct SoftenedReport {
     /// Number of softened tets.
     pub tets: usize,

@@ -2,7 +2,9 @@
 //!
 //! A scene names what it needs; features that it does not name cost nothing. Every key has a documented default, and an
 //! unknown key is an error that names the nearest known one. The format is TOML. The structs are the only place that
-//! documents keys, with units and ranges: `docs/scene.md` and the JSON Schema are generated from them.
+//! documents keys, with units and ranges: `docs/scene.md` and the JSON Schema are generated from them. All of them are
+//! `non_exhaustive`, so that a new key breaks no program: structs start from their defaults and are changed by assignment
+//! or `with`, variants have constructors.
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +46,22 @@ pub use substeps::Substeps;
 
 pub use crate::names::{nearest, suggestion};
 
-/// A scene.
+/// A scene: TOML text, or the defaults with changes.
+///
+/// ```
+/// use incise::Scene;
+/// use incise::scene::{BodySpec, Region, ShapeSpec, StrokeSpec};
+///
+/// let mut scene = Scene::default();
+/// scene.world.gravity = Some([0.0, 0.0, -9.81]);
+/// scene.solver.substeps = 20.into();
+/// scene.body.push(BodySpec::default().with(|body| {
+///     body.shape = Some(ShapeSpec::new("beam", 1000));
+///     body.fixed = vec![Region::half_space([-0.49, 0.0, 0.0], [-1.0, 0.0, 0.0])];
+/// }));
+/// scene.stroke.push(StrokeSpec::plane(10, [0.0; 3], [1.0, 0.0, 0.0]));
+/// assert_eq!(scene.body[0].young_modulus, 1e5); // a default
+/// ```
 ///
 /// ```
 /// let scene = incise::Scene::from_toml(
@@ -63,6 +80,7 @@ pub use crate::names::{nearest, suggestion};
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct Scene {
     /// Reported quantities beside times and counts.
     #[serde(default, skip_serializing_if = "ReportSpec::is_default")]
@@ -100,6 +118,7 @@ pub struct Scene {
 /// Reported quantities and how often they are computed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ReportSpec {
     /// Frames from one report to the next.
     #[serde(default = "one")]
@@ -128,6 +147,7 @@ impl Default for ReportSpec {
 /// A quantity that is computed for reports.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Quantity {
     /// Primal and dual residual of the last substep.
     Residual,
@@ -148,6 +168,7 @@ pub enum Quantity {
 /// Forces and obstacles that act on all bodies.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct WorldSpec {
     /// Acceleration of gravity; absent: none.
     #[schemars(extend("unit" = "m/s²"))]
@@ -157,8 +178,9 @@ pub struct WorldSpec {
 }
 
 /// A horizontal floor; up is z.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct GroundSpec {
     /// Height of the floor.
     #[schemars(extend("unit" = "m"), range(min = -1e9, max = 1e9))]
@@ -172,6 +194,7 @@ pub struct GroundSpec {
 /// A body: mesh, position and material.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct BodySpec {
     /// A mesh file, relative to the scene file. Either this or `shape`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -221,6 +244,7 @@ pub struct BodySpec {
 /// The material of a part of a body. Absent keys have the body's values.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct MaterialSpec {
     /// The part: tets whose centers at rest lie in any of these regions. Where parts overlap, the last one counts.
     pub regions: Vec<Region>,
@@ -265,6 +289,7 @@ impl Default for BodySpec {
 /// A generated shape.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ShapeSpec {
     /// Name of the shape.
     #[schemars(extend("enum" = incise_meshing::Shape::NAMES))]
@@ -273,6 +298,60 @@ pub struct ShapeSpec {
     #[schemars(range(min = 1))]
     pub tets: usize,
 }
+
+impl ShapeSpec {
+    /// A shape by name, with about this number of tets.
+    #[must_use]
+    pub fn new(kind: impl Into<String>, tets: usize) -> Self {
+        Self {
+            kind: kind.into(),
+            tets,
+        }
+    }
+}
+
+impl Default for ShapeSpec {
+    /// A box of about 1000 tets.
+    fn default() -> Self {
+        Self::new("box", 1000)
+    }
+}
+
+/// Gives each struct of a scene the method `with`.
+macro_rules! with {
+    ($($name:ident),*) => {$(
+        impl $name {
+            /// Returns the value after a change of its fields. The struct is `non_exhaustive`, so that a program still
+            /// compiles when a key is added; other crates change a default instead of naming all fields.
+            #[must_use]
+            pub fn with(mut self, change: impl FnOnce(&mut Self)) -> Self {
+                change(&mut self);
+                self
+            }
+        }
+    )*};
+}
+
+with!(
+    Scene,
+    ReportSpec,
+    WorldSpec,
+    GroundSpec,
+    BodySpec,
+    MaterialSpec,
+    ShapeSpec,
+    AttachmentSpec,
+    PathRotationSpec,
+    RotationSpec,
+    ContactSpec,
+    CuttingSpec,
+    DistanceSpec,
+    EndSpec,
+    SolverSpec,
+    ReclusterSpec,
+    SleepSpec,
+    SolidBladeSpec
+);
 
 impl Scene {
     /// The built-in scene: a generated liver held at one side, sliced by a moving blade.

@@ -35,7 +35,7 @@ impl Legend {
     /// # use incise::{Scene, Simulation, scene::ShapeSpec};
     /// # use incise_render::{ColorBy, RenderScene};
     /// # let mut scene = Scene::built_in();
-    /// # scene.body[0].shape = Some(ShapeSpec { kind: "box".into(), tets: 500 });
+    /// # scene.body[0].shape = Some(ShapeSpec::new("box", 500));
     /// # let mut simulation = Simulation::new(&scene)?;
     /// let mut render_scene = RenderScene::new(&simulation, &scene);
     /// let legend = render_scene.color(&mut simulation, ColorBy::Stretch, None)?.expect("values");

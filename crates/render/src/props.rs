@@ -134,6 +134,8 @@ impl Props {
                 let half = DVec3::from_array(half_extents);
                 self.cuboid(view, at(center, velocity), half, turn);
             }
+            // A kind that the renderer does not know acts unseen.
+            _ => {}
         }
     }
 

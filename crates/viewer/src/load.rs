@@ -118,10 +118,7 @@ fn scene_around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuil
     let mut scene = Scene::built_in();
     scene.stroke.clear();
     scene.body.clear();
-    let table = GroundSpec {
-        height: 0.0,
-        friction: 0.5,
-    };
+    let table = GroundSpec::default().with(|spec| spec.friction = 0.5);
     scene.world.ground = Some(table);
     let pinned_below = low.z + 0.1 * (high.z - low.z);
     let middle = (low + high) / 2.0;

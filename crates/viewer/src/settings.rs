@@ -42,13 +42,14 @@ fn backend_name(backend: Backend) -> &'static str {
         Backend::Cpu => "CPU",
         Backend::Gpu => "GPU",
         Backend::Auto => "Auto",
+        _ => "other",
     }
 }
 
 fn substeps_name(substeps: Substeps) -> String {
     match substeps {
         Substeps::Fixed(count) => count.to_string(),
-        Substeps::Auto => "auto".to_owned(),
+        _ => "auto".to_owned(),
     }
 }
 
@@ -110,7 +111,7 @@ pub(crate) fn show(
         let mut auto = spec.substeps == Substeps::Auto;
         let mut count = match spec.substeps {
             Substeps::Fixed(count) => count,
-            Substeps::Auto => 30,
+            _ => 30,
         };
         let slider = Slider::new(&mut count, 1..=spec.max_substeps.max(2))
             .logarithmic(true)
@@ -122,10 +123,7 @@ pub(crate) fn show(
             } else {
                 Substeps::Fixed(count)
             };
-            let spec_after = SolverSpec {
-                substeps,
-                ..spec.clone()
-            };
+            let spec_after = spec.clone().with(|spec| spec.substeps = substeps);
             let (from, to) = (substeps_name(spec.substeps), substeps_name(substeps));
             changed("Substeps", from, to, spec_after);
         }
@@ -136,10 +134,7 @@ pub(crate) fn show(
         .logarithmic(true)
         .clamping(SliderClamping::Edits);
     if ui.add(slider.text("Iterations")).changed() {
-        let spec_after = SolverSpec {
-            iterations,
-            ..spec.clone()
-        };
+        let spec_after = spec.clone().with(|spec| spec.iterations = iterations);
         let (from, to) = (spec.iterations.to_string(), iterations.to_string());
         changed("Iterations", from, to, spec_after);
     }
@@ -149,10 +144,7 @@ pub(crate) fn show(
         .max_decimals(2)
         .clamping(SliderClamping::Edits);
     if ui.add(slider.text("Relaxation")).changed() {
-        let spec_after = SolverSpec {
-            relaxation,
-            ..spec.clone()
-        };
+        let spec_after = spec.clone().with(|spec| spec.relaxation = relaxation);
         let (from, to) = (
             format!("{:.2}", spec.relaxation),
             format!("{relaxation:.2}"),
@@ -183,10 +175,9 @@ pub(crate) fn show(
         }
         ui.label("Clustering");
         if clustering != spec.clustering {
-            let spec_after = SolverSpec {
-                clustering: clustering.clone(),
-                ..spec.clone()
-            };
+            let spec_after = spec
+                .clone()
+                .with(|spec| spec.clustering = clustering.clone());
             changed(
                 "Clustering",
                 spec.clustering.clone(),
@@ -205,10 +196,7 @@ pub(crate) fn show(
                     ui.selectable_value(&mut chosen, backend, backend_name(backend));
                     if chosen != present {
                         let (from, to) = (backend_name(present), backend_name(backend));
-                        let spec_after = SolverSpec {
-                            backend,
-                            ..spec.clone()
-                        };
+                        let spec_after = spec.clone().with(|spec| spec.backend = backend);
                         changed("Backend", from.into(), to.into(), spec_after);
                     }
                 }
@@ -225,14 +213,13 @@ fn with_method(spec: &SolverSpec, method: Method) -> SolverSpec {
         kappa_limit,
         ..
     } = SolverSpec::of(method);
-    SolverSpec {
-        method,
-        iterations,
-        relaxation,
-        kappa_limit,
-        two_level: false,
-        ..spec.clone()
-    }
+    spec.clone().with(|spec| {
+        spec.method = method;
+        spec.iterations = iterations;
+        spec.relaxation = relaxation;
+        spec.kappa_limit = kappa_limit;
+        spec.two_level = false;
+    })
 }
 
 #[cfg(test)]

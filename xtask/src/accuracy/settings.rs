@@ -21,64 +21,41 @@ pub(super) struct Exchange {
 }
 
 pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
-    let of = |method, eighths: u32, iterations| SolverSpec {
-        time_step: 1.0 / 60.0,
-        substeps: Substeps::Fixed((substeps * eighths).div_ceil(8)),
-        iterations,
-        precision: Precision::F32,
-        ..SolverSpec::of(method)
+    let of = |method, eighths: u32, iterations| {
+        SolverSpec::of(method).with(|spec| {
+            spec.time_step = 1.0 / 60.0;
+            spec.substeps = Substeps::Fixed((substeps * eighths).div_ceil(8));
+            spec.iterations = iterations;
+            spec.precision = Precision::F32;
+        })
     };
     let xpbd = |eighths, iterations| of(Method::GaussSeidel, eighths, iterations);
-    let double = |spec: SolverSpec| SolverSpec {
-        precision: Precision::F64,
-        ..spec
+    let double = |spec: SolverSpec| spec.with(|spec| spec.precision = Precision::F64);
+    let clustered = |name: &str| xpbd(8, 1).with(|spec| spec.clustering = name.to_owned());
+    let relaxed = |relaxation| xpbd(8, 1).with(|spec| spec.relaxation = relaxation);
+    let sequential = |eighths| xpbd(eighths, 1).with(|spec| spec.tet_solve = TetSolve::Sequential);
+    let block = |eighths| xpbd(eighths, 1).with(|spec| spec.tet_solve = TetSolve::Block);
+    let accurate = |accuracy| {
+        SolverSpec::default().with(|spec| {
+            spec.accuracy = Some(accuracy);
+            spec.time_step = 1.0 / 60.0;
+        })
     };
-    let clustered = |name: &str| SolverSpec {
-        clustering: name.to_owned(),
-        ..xpbd(8, 1)
+    let jacobi = |eighths, iterations, relaxation| {
+        of(Method::Jacobi, eighths, iterations).with(|spec| spec.relaxation = relaxation)
     };
-    let relaxed = |relaxation| SolverSpec {
-        relaxation,
-        ..xpbd(8, 1)
+    let chebyshev = |eighths, iterations| {
+        of(Method::Chebyshev, eighths, iterations).with(|spec| spec.spectral_radius = 0.9)
     };
-    let sequential = |eighths| SolverSpec {
-        tet_solve: TetSolve::Sequential,
-        ..xpbd(eighths, 1)
+    let vbd = |substeps: u32, iterations, relaxation| {
+        of(Method::Vbd, 8, iterations).with(|spec| {
+            spec.substeps = Substeps::Fixed(substeps);
+            spec.relaxation = relaxation;
+        })
     };
-    let block = |eighths| SolverSpec {
-        tet_solve: TetSolve::Block,
-        ..xpbd(eighths, 1)
-    };
-    let accurate = |accuracy| SolverSpec {
-        accuracy: Some(accuracy),
-        time_step: 1.0 / 60.0,
-        ..SolverSpec::default()
-    };
-    let jacobi = |eighths, iterations, relaxation| SolverSpec {
-        relaxation,
-        ..of(Method::Jacobi, eighths, iterations)
-    };
-    let chebyshev = |eighths, iterations| SolverSpec {
-        spectral_radius: 0.9,
-        ..of(Method::Chebyshev, eighths, iterations)
-    };
-    let vbd = |substeps: u32, iterations, relaxation| SolverSpec {
-        substeps: Substeps::Fixed(substeps),
-        relaxation,
-        ..of(Method::Vbd, 8, iterations)
-    };
-    let coarse = |substeps: u32| SolverSpec {
-        two_level: true,
-        ..double(vbd(substeps, 4, 1.0))
-    };
-    let softened = |spec: SolverSpec| SolverSpec {
-        kappa_limit: 1.0,
-        ..spec
-    };
-    let on_gpu = |eighths| SolverSpec {
-        backend: Backend::Gpu,
-        ..xpbd(eighths, 1)
-    };
+    let coarse = |substeps: u32| double(vbd(substeps, 4, 1.0)).with(|spec| spec.two_level = true);
+    let softened = |spec: SolverSpec| spec.with(|spec| spec.kappa_limit = 1.0);
+    let on_gpu = |eighths| xpbd(eighths, 1).with(|spec| spec.backend = Backend::Gpu);
 
     let mut all: Vec<(&'static str, SolverSpec)> = Vec::new();
     let mut add = |curve, specs: Vec<SolverSpec>| {
@@ -332,21 +309,19 @@ pub(super) fn settings(substeps: u32, gpu: bool) -> Settings {
 
 /// One substep of `iterations` iterations in double precision, to test the iteration alone.
 pub(super) fn large_step(iterations: u32) -> SolverSpec {
-    SolverSpec {
-        time_step: 1.0 / 60.0,
-        substeps: Substeps::Fixed(1),
-        iterations,
-        precision: Precision::F64,
-        ..SolverSpec::of(Method::GaussSeidel)
-    }
+    SolverSpec::of(Method::GaussSeidel).with(|spec| {
+        spec.time_step = 1.0 / 60.0;
+        spec.substeps = Substeps::Fixed(1);
+        spec.iterations = iterations;
+        spec.precision = Precision::F64;
+    })
 }
 
 /// One large step of implicit Euler by VBD, each sweep with a coarse correction.
 pub(super) fn large_vbd(iterations: u32) -> SolverSpec {
-    SolverSpec {
-        method: Method::Vbd,
-        two_level: true,
-        integrator: Integrator::ImplicitEuler,
-        ..large_step(iterations)
-    }
+    large_step(iterations).with(|spec| {
+        spec.method = Method::Vbd;
+        spec.two_level = true;
+        spec.integrator = Integrator::ImplicitEuler;
+    })
 }

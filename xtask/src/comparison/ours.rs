@@ -31,8 +31,8 @@ pub(super) struct Ours {
 /// Measures this solver, with clusters of ten as in scenes.
 pub(super) fn ours(cells: [usize; 3], frames: u32, precision: Precision) -> anyhow::Result<Ours> {
     match precision {
-        Precision::F32 | Precision::Auto => in_precision::<f32>(cells, frames),
         Precision::F64 => in_precision::<f64>(cells, frames),
+        _ => in_precision::<f32>(cells, frames),
     }
 }
 

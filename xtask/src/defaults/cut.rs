@@ -154,41 +154,34 @@ fn random_stroke(simulation: &Simulation, random: &mut Random, snap: f64) -> Str
     let u = random.vector().normalize_or(DVec3::X);
     let v = random.vector().cross(u);
     let v = v.normalize_or(u.any_orthonormal_vector());
-    StrokeSpec::Rectangle {
-        frame: simulation.next_frame(),
-        center: center.to_array(),
-        half_u: (u * size).to_array(),
-        half_v: (v * size).to_array(),
-        snap,
-    }
+    StrokeSpec::rectangle(
+        simulation.next_frame(),
+        center.to_array(),
+        (u * size).to_array(),
+        (v * size).to_array(),
+    )
+    .with_snap(snap)
 }
 
 /// Scene with a body of 25 cm from a mesh file.
 fn scene(file: PathBuf, mesh: &TetMesh, young_modulus: f64, precision: Precision) -> Scene {
-    let (low, high) = ends(mesh);
+    let (low, high) = ends(mesh.positions.iter().copied());
     let mut scene = Scene::default();
     scene.report.quantities = vec![Quantity::Speed, Quantity::Volume, Quantity::Kappa];
     scene.solver.precision = precision;
-    scene.body.push(BodySpec {
-        mesh: Some(file),
-        shape: None,
-        scale: SIZE / (high - low).max_element(),
-        position: [0.0; 3],
-        young_modulus,
-        poisson_ratio: 0.45,
-        density: 1000.0,
-        damping: 0.0,
-        volume_compliance: None,
-        substeps: None,
-        fixed: Vec::new(),
-        ..BodySpec::default()
-    });
+    scene.body.push(BodySpec::default().with(|spec| {
+        spec.mesh = Some(file);
+        spec.scale = SIZE / (high - low).max_element();
+        spec.young_modulus = young_modulus;
+        spec.poisson_ratio = 0.45;
+        spec.density = 1000.0;
+    }));
     scene
 }
 
-pub(super) fn ends(mesh: &TetMesh) -> (DVec3, DVec3) {
-    let positions = mesh.positions.iter();
-    positions.fold((DVec3::MAX, DVec3::MIN), |(low, high), &x| {
+/// Corners of the smallest box around positions.
+pub(super) fn ends(positions: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    positions.fold((DVec3::MAX, DVec3::MIN), |(low, high), x| {
         (low.min(x), high.max(x))
     })
 }
@@ -207,13 +200,13 @@ pub(super) fn load(
         .mesh()?
         .context("the body of this scene is generated")?;
     let mut scene = scene(file, &mesh, young_modulus, precision);
-    let (low, high) = ends(&mesh);
+    let (low, high) = ends(mesh.positions.iter().copied());
     let height = (high.z - low.z) * scene.body[0].scale + strokes.drop();
     scene.world.gravity = Some([0.0, 0.0, -9.81]);
-    scene.world.ground = Some(GroundSpec {
-        height: low.z * scene.body[0].scale - strokes.drop(),
-        friction: 0.5,
-    });
+    scene.world.ground = Some(GroundSpec::default().with(|spec| {
+        spec.height = low.z * scene.body[0].scale - strokes.drop();
+        spec.friction = 0.5;
+    }));
     scene.report.quantities.push(Quantity::Energy);
     scene.solver.time_step = 0.01;
     scene.solver.substeps = substeps.into();

@@ -190,10 +190,8 @@ impl Setup {
         let depth = 0.15 * extent.dot(axis);
         let fixed_side = low * axis + depth * axis;
         let held_side = high * axis - depth * axis;
-        let half_space = |point: DVec3, normal: DVec3| Region::HalfSpace {
-            point: point.to_array(),
-            normal: normal.to_array(),
-        };
+        let half_space =
+            |point: DVec3, normal: DVec3| Region::half_space(point.to_array(), normal.to_array());
         let below = |x: DVec3| x.dot(axis) <= fixed_side.dot(axis);
         let above = |x: DVec3| x.dot(axis) >= held_side.dot(axis);
         let is_held = case.load == Load::Pressed;
@@ -206,41 +204,26 @@ impl Setup {
         if case.load == Load::Hanging {
             scene.world.gravity = Some(gravity.to_array());
         }
-        scene.body.push(BodySpec {
-            mesh: None,
-            shape: Some(ShapeSpec {
-                kind: case.shape.to_string(),
-                tets: case.tets,
-            }),
-            scale: SIZE,
-            position: [0.0; 3],
-            young_modulus: case.young_modulus,
-            poisson_ratio: case.poisson_ratio,
-            density: DENSITY,
-            damping: 0.0,
-            volume_compliance: None,
-            substeps: None,
-            fixed: if is_fixed {
+        scene.body.push(BodySpec::default().with(|spec| {
+            spec.shape = Some(ShapeSpec::new(case.shape.to_string(), case.tets));
+            spec.scale = SIZE;
+            spec.young_modulus = case.young_modulus;
+            spec.poisson_ratio = case.poisson_ratio;
+            spec.density = DENSITY;
+            spec.fixed = if is_fixed {
                 vec![half_space(fixed_side, -axis)]
             } else {
                 Vec::new()
-            },
-            ..BodySpec::default()
-        });
+            };
+        }));
         let press = match (case.load, case.shape) {
             (Load::Pressed, Shape::Beam) => DVec3::NEG_Z * PRESS * extent.x,
             (Load::Pressed, _) => DVec3::NEG_Z * PRESS * extent.z,
             _ => DVec3::ZERO,
         };
         if is_held {
-            scene.attachment.push(AttachmentSpec {
-                body: 0,
-                regions: vec![half_space(held_side, axis)],
-                frames: [0, 1],
-                path: vec![[0.0; 3], [0.0; 3]],
-                rotation: None,
-                compliance: 0.0,
-            });
+            let held = AttachmentSpec::new(0, vec![half_space(held_side, axis)]);
+            scene.attachment.push(held);
         }
         let rate = (0.24 * case.young_modulus / DENSITY).sqrt() / SIZE;
         let positions = mesh.positions.iter();

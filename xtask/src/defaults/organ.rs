@@ -15,6 +15,10 @@ use crate::experiment::median;
 
 /// Longest side in m.
 const SIZE: f64 = 0.2;
+/// Part of the length at each end that is held or pulled.
+const HELD: f64 = 0.1;
+/// Length of the pull in m.
+const PULLED_BY: f64 = 0.03;
 /// Frames of the pull.
 const PULL: usize = 30;
 /// Frames in all.
@@ -74,12 +78,12 @@ impl OrganRow {
 /// Organ scene with or without the strokes of the cut form.
 fn scene(tets: usize, strokes: usize, accuracy: f64, folder: &Path) -> anyhow::Result<Scene> {
     let mesh = generate(Shape::Liver, tets)?;
-    let (low, high) = super::cut::ends(&mesh);
+    let (low, high) = super::cut::ends(mesh.positions.iter().copied());
     let scale = SIZE / (high - low).max_element();
     let file = folder.join(format!("organ-{tets}.vtk"));
     mesh_io::write(&file, &mesh)?;
     let at = |part: f64| scale * (low.x + part * (high.x - low.x));
-    let (held, pulled) = (at(0.1), at(0.9));
+    let (held, pulled) = (at(HELD), at(1.0 - HELD));
     let mut text = format!(
         "[world]
 gravity = [0.0, 0.0, -9.81]
@@ -95,12 +99,19 @@ fixed = [{{ half_space = {{ point = [{held}, 0.0, 0.0], normal = [-1.0, 0.0, 0.0
 [[attachment]]
 regions = [{{ half_space = {{ point = [{pulled}, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }} }}]
 frames = [0, {PULL}]
-path = [[0.0, 0.0, 0.0], [0.03, 0.0, 0.0]]
+path = [[0.0, 0.0, 0.0], [{PULLED_BY}, 0.0, 0.0]]
 "
     );
-    let (middle, top) = (0.5 * scale * (low + high), scale * high.z);
+    let top = scale * high.z;
     for stroke in 0..strokes {
-        let x = at(0.25 + 0.5 * stroke as f64 / (STROKES - 1) as f64);
+        // Where the pull has moved the particles that are at this part of the length at rest.
+        let part = 0.25 + 0.5 * stroke as f64 / (STROKES - 1) as f64;
+        let x = at(part) + PULLED_BY * (part - HELD) / (1.0 - 2.0 * HELD);
+        // The organ narrows to one side: a blade up to the middle of the whole would pass beside it there.
+        let near = mesh.positions.iter().map(|&at_rest| scale * at_rest);
+        let near = near.filter(|p| (p.x - at(part)).abs() < 0.05 * SIZE);
+        let (near_low, near_high) = super::cut::ends(near);
+        let middle = 0.5 * (near_low + near_high);
         let first = PULL + 1 + 4 * stroke;
         text += &format!(
             "[[stroke]]
@@ -150,14 +161,13 @@ pub(super) fn measure(
     let body = report.bodies.first();
     let reference = |substeps| {
         let mut scene = scene.clone();
-        scene.solver = SolverSpec {
-            time_step: scene.solver.time_step,
-            substeps: Substeps::Fixed(substeps),
-            iterations: REFERENCE_ROUNDS,
-            two_level: true,
-            precision: Precision::F64,
-            ..SolverSpec::of(Method::Vbd)
-        };
+        scene.solver = SolverSpec::of(Method::Vbd).with(|spec| {
+            spec.time_step = scene.solver.time_step;
+            spec.substeps = Substeps::Fixed(substeps);
+            spec.iterations = REFERENCE_ROUNDS;
+            spec.two_level = true;
+            spec.precision = Precision::F64;
+        });
         Motion::of(&scene, FRAMES, None)
     };
     let best = reference(REFERENCE_SUBSTEPS)?;

@@ -93,13 +93,11 @@ fn scene(model: &Model, clustering: &str, stroke_frames: u32) -> Scene {
     let (blade, way) = stroke(&model.mesh);
     scene.stroke = match stroke_frames {
         0 => Vec::new(),
-        frames => vec![StrokeSpec::Sweep {
-            frames: [1, 1 + u64::from(frames)],
-            blade: blade.map(|x| (x * scale).to_array()).to_vec(),
-            path: vec![[0.0; 3], (way * scale).to_array()],
-            snap: 0.1,
-            solid: None,
-        }],
+        frames => vec![StrokeSpec::sweep(
+            [1, 1 + u64::from(frames)],
+            blade.map(|x| (x * scale).to_array()).to_vec(),
+            vec![[0.0; 3], (way * scale).to_array()],
+        )],
     };
     scene
 }

@@ -70,23 +70,14 @@ fn bare(tets: usize) -> Scene {
 
 /// Beam of length 1 along x, with its center at a height.
 fn beam(tets: usize, height: f64) -> BodySpec {
-    BodySpec {
-        mesh: None,
-        shape: Some(ShapeSpec {
-            kind: "beam".to_owned(),
-            tets,
-        }),
-        scale: 1.0,
-        position: [0.0, 0.0, height],
-        young_modulus: 1e4,
-        poisson_ratio: 0.45,
-        density: 1000.0,
-        damping: 0.0,
-        volume_compliance: None,
-        substeps: None,
-        fixed: Vec::new(),
-        ..BodySpec::default()
-    }
+    BodySpec::default().with(|spec| {
+        spec.shape = Some(ShapeSpec::new("beam", tets));
+        spec.scale = 1.0;
+        spec.position = [0.0, 0.0, height];
+        spec.young_modulus = 1e4;
+        spec.poisson_ratio = 0.45;
+        spec.density = 1000.0;
+    })
 }
 
 /// Distance that is never reached, in m.
@@ -94,43 +85,28 @@ const FAR: f64 = 1e3;
 /// Frame that is never reached.
 const LATE: u64 = 1_000_000;
 /// The end of the beam.
-const END: Region = Region::HalfSpace {
-    point: [-0.49, 0.0, 0.0],
-    normal: [-1.0, 0.0, 0.0],
-};
+const END: Region = Region::half_space([-0.49, 0.0, 0.0], [-1.0, 0.0, 0.0]);
 
 fn handle(frames: [u64; 2], way: f64, compliance: f64) -> AttachmentSpec {
-    AttachmentSpec {
-        body: 0,
-        regions: vec![END],
-        frames,
-        path: vec![[0.0; 3], [way, 0.0, 0.0]],
-        rotation: None,
-        compliance,
-    }
+    AttachmentSpec::new(0, vec![END]).with(|spec| {
+        spec.frames = frames;
+        spec.path = vec![[0.0; 3], [way, 0.0, 0.0]];
+        spec.compliance = compliance;
+    })
 }
 
 fn ball(at: f64, velocity: f64) -> ColliderSpec {
-    ColliderSpec::Sphere {
-        center: [0.0, 0.0, at],
-        radius: 0.2,
-        friction: 0.3,
-        velocity: [velocity, 0.0, 0.0],
-    }
+    ColliderSpec::sphere([0.0, 0.0, at], 0.2)
+        .with_friction(0.3)
+        .with_velocity([velocity, 0.0, 0.0])
 }
 
 fn link(tension_only: bool, length: Option<f64>) -> DistanceSpec {
-    let end = |x| EndSpec {
-        body: 0,
-        point: [x, 0.125, 0.125],
-    };
-    DistanceSpec {
-        from: end(-0.5),
-        to: end(0.5),
-        length,
-        compliance: 0.0,
-        tension_only,
-    }
+    let end = |x| EndSpec::new(0, [x, 0.125, 0.125]);
+    DistanceSpec::new(end(-0.5), end(0.5)).with(|spec| {
+        spec.length = length;
+        spec.tension_only = tension_only;
+    })
 }
 
 /// Two beams, one above the other, held together by a rod.
@@ -138,46 +114,30 @@ fn two_linked(scene: &mut Scene) {
     let mut second = scene.body[0].clone();
     second.position = [0.0, 0.0, 0.5];
     scene.body.push(second);
-    scene.distance.push(DistanceSpec {
-        from: EndSpec {
-            body: 0,
-            point: [0.0, 0.0, 0.125],
-        },
-        to: EndSpec {
-            body: 1,
-            point: [0.0, 0.0, 0.375],
-        },
-        length: None,
-        compliance: 0.0,
-        tension_only: false,
-    });
+    scene.distance.push(DistanceSpec::new(
+        EndSpec::new(0, [0.0, 0.0, 0.125]),
+        EndSpec::new(1, [0.0, 0.0, 0.375]),
+    ));
 }
 
 fn plane(snap: f64) -> StrokeSpec {
-    StrokeSpec::Plane {
-        frame: LATE,
-        point: [0.013, 0.0, 0.0],
-        normal: [1.0, 0.0, 0.0],
-        snap,
-    }
+    StrokeSpec::plane(LATE, [0.013, 0.0, 0.0], [1.0, 0.0, 0.0]).with_snap(snap)
 }
 
 /// A blade that moves beside the beam.
 fn blade(frames: [u64; 2]) -> StrokeSpec {
-    StrokeSpec::Sweep {
+    StrokeSpec::sweep(
         frames,
-        blade: vec![[0.0, 2.0, -1.0], [0.0, 2.0, 1.0]],
-        path: vec![[0.0; 3], [0.0, 1.0, 0.0]],
-        snap: 0.1,
-        solid: None,
-    }
+        vec![[0.0, 2.0, -1.0], [0.0, 2.0, 1.0]],
+        vec![[0.0; 3], [0.0, 1.0, 0.0]],
+    )
 }
 
 fn report(quantity: Quantity, every: u64) -> ReportSpec {
-    ReportSpec {
-        every,
-        quantities: vec![quantity],
-    }
+    ReportSpec::default().with(|spec| {
+        spec.every = every;
+        spec.quantities = vec![quantity];
+    })
 }
 
 /// All scenes, bases first.
@@ -201,16 +161,16 @@ pub(crate) fn cases() -> Vec<Case> {
             s.world.gravity = Some([0.0, 0.0, -9.81]);
         }),
         case("ground", Idle, "far below", |s| {
-            s.world.ground = Some(GroundSpec {
-                height: -FAR,
-                friction: 0.5,
-            });
+            s.world.ground = Some(GroundSpec::default().with(|spec| {
+                spec.height = -FAR;
+                spec.friction = 0.5;
+            }));
         }),
         case("ground", Used, "in the lowest layer of the beam", |s| {
-            s.world.ground = Some(GroundSpec {
-                height: -0.1249,
-                friction: 0.5,
-            });
+            s.world.ground = Some(GroundSpec::default().with(|spec| {
+                spec.height = -0.1249;
+                spec.friction = 0.5;
+            }));
         }),
         case("collider", Idle, "a ball far away", |s| {
             s.collider.push(ball(FAR, 0.0));
@@ -312,16 +272,10 @@ pub(crate) fn cases() -> Vec<Case> {
             s.report = report(Quantity::Kappa, 1);
         }),
         case("sleep", Idle, "awake, at rest for 1000 s", |s| {
-            s.solver.sleep = Some(SleepSpec {
-                speed: 1e-3,
-                time: 1000.0,
-            });
+            s.solver.sleep = Some(SleepSpec::new(1e-3, 1000.0));
         }),
         case("sleep", Used, "asleep after a frame", |s| {
-            s.solver.sleep = Some(SleepSpec {
-                speed: 1e-3,
-                time: 1e-3,
-            });
+            s.solver.sleep = Some(SleepSpec::new(1e-3, 1e-3));
         }),
         case("iterations", Used, "2 a substep", |s| {
             s.solver.iterations = 2;
@@ -353,10 +307,10 @@ pub(crate) fn cases() -> Vec<Case> {
             s.body[0].young_modulus = 1e8;
         }),
         case("recluster", Idle, "nothing is worn", |s| {
-            s.solver.recluster = Some(ReclusterSpec {
-                threshold: 1.25,
-                frames: std::num::NonZeroU32::MIN,
-            });
+            s.solver.recluster = Some(ReclusterSpec::default().with(|spec| {
+                spec.threshold = 1.25;
+                spec.frames = std::num::NonZeroU32::MIN;
+            }));
         }),
         case("no merging", Used, "clusters of cut tets stay apart", |s| {
             s.solver.merge_clusters = false;

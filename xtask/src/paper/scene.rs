@@ -40,13 +40,11 @@ pub(super) fn strokes(mesh: &TetMesh, scale: f64, frames: u64, blades: u64) -> V
         let first = 1 + blade * frames / blades;
         // A little askew, so that no lattice is met along its planes.
         let ends = [at(x - 0.02, -0.2, 1.02), at(x + 0.013, 1.2, 1.02)];
-        StrokeSpec::Sweep {
-            frames: [first, (blade + 1) * frames / blades],
-            blade: ends.map(|end| end.to_array()).to_vec(),
-            path: vec![[0.0; 3], way.to_array()],
-            snap: 0.1,
-            solid: None,
-        }
+        StrokeSpec::sweep(
+            [first, (blade + 1) * frames / blades],
+            ends.map(|end| end.to_array()).to_vec(),
+            vec![[0.0; 3], way.to_array()],
+        )
     };
     (0..blades).map(stroke).collect()
 }

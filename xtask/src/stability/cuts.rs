@@ -87,60 +87,38 @@ impl Cut {
     }
 
     fn scene(self, column: Column, quick: bool) -> Scene {
-        let mut scene = Scene {
-            solver: column.method.spec(column),
-            ..Scene::default()
-        };
+        let mut scene = Scene::default().with(|spec| spec.solver = column.method.spec(column));
         scene.report.quantities = vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa];
         let gravity = if self == Self::FastBody { 1e2 } else { 9.81 };
         let at_rest = matches!(self, Self::AtRest(_));
         scene.world.gravity = (!at_rest).then_some([0.0, 0.0, -gravity]);
         // Parts cut off by the blade fall on without a ground and are not crushed.
-        scene.world.ground = (self != Self::FastBody && !at_rest).then_some(GroundSpec {
-            height: -1.0,
-            friction: 0.5,
-        });
-        let held = Region::HalfSpace {
-            point: [-0.45, 0.0, 0.0],
-            normal: [-1.0, 0.0, 0.0],
-        };
-        scene.body.push(BodySpec {
-            mesh: None,
-            shape: Some(ShapeSpec {
-                kind: "beam".to_owned(),
-                tets: if quick { 300 } else { 1500 },
-            }),
-            scale: 1.0,
-            position: [0.0; 3],
-            young_modulus: 1e4,
-            poisson_ratio: 0.45,
-            density: 1000.0,
-            damping: 0.0,
-            volume_compliance: None,
-            substeps: None,
-            fixed: if self == Self::FastBody || at_rest {
+        scene.world.ground =
+            (self != Self::FastBody && !at_rest).then_some(GroundSpec::default().with(|spec| {
+                spec.height = -1.0;
+                spec.friction = 0.5;
+            }));
+        let held = Region::half_space([-0.45, 0.0, 0.0], [-1.0, 0.0, 0.0]);
+        scene.body.push(BodySpec::default().with(|spec| {
+            spec.shape = Some(ShapeSpec::new("beam", if quick { 300 } else { 1500 }));
+            spec.scale = 1.0;
+            spec.young_modulus = 1e4;
+            spec.poisson_ratio = 0.45;
+            spec.density = 1000.0;
+            spec.fixed = if self == Self::FastBody || at_rest {
                 Vec::new()
             } else {
                 vec![held]
-            },
-            ..BodySpec::default()
-        });
+            };
+        }));
         let last = self.frames(quick) - 1;
         let blade = |height: f64| vec![[0.02, -1.0, height], [0.03, 1.0, height]];
-        let sweep = |frames, blade, way: f64| StrokeSpec::Sweep {
-            frames,
-            blade,
-            path: vec![[0.0; 3], [0.0, 0.0, way]],
-            snap: 0.0,
-            solid: None,
+        let sweep = |frames, blade, way: f64| {
+            StrokeSpec::sweep(frames, blade, vec![[0.0; 3], [0.0, 0.0, way]]).with_snap(0.0)
         };
         let edge = if quick { 0.1 } else { 0.06 };
-        let plane = |frame, x: f64| StrokeSpec::Plane {
-            frame,
-            point: [x, 0.0, 0.0],
-            normal: [1.0, 0.0, 0.3],
-            snap: 0.0,
-        };
+        let plane =
+            |frame, x: f64| StrokeSpec::plane(frame, [x, 0.0, 0.0], [1.0, 0.0, 0.3]).with_snap(0.0);
         scene.stroke = match self {
             Self::Strokes | Self::AtRest(_) | Self::UnderLoad(_) => Vec::new(),
             Self::Slivers => [-0.2, 0.05, 0.3]
@@ -217,13 +195,13 @@ fn random_stroke(simulation: &Simulation, noise: &mut Random) -> StrokeSpec {
         .vector()
         .cross(u)
         .normalize_or(u.any_orthonormal_vector());
-    StrokeSpec::Rectangle {
-        frame: simulation.report().frame + u64::from(simulation.report().time_s > 0.0),
-        center: center.to_array(),
-        half_u: (u * size).to_array(),
-        half_v: (v * size).to_array(),
-        snap: 0.0,
-    }
+    StrokeSpec::rectangle(
+        simulation.report().frame + u64::from(simulation.report().time_s > 0.0),
+        center.to_array(),
+        (u * size).to_array(),
+        (v * size).to_array(),
+    )
+    .with_snap(0.0)
 }
 
 /// Monitors a simulation after every frame.

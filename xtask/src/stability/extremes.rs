@@ -230,14 +230,13 @@ impl Extreme {
     /// The body at its start as a simulation. Of extremes of state it is the body at rest.
     pub(crate) fn simulation(&self, solver: SolverSpec) -> Result<Simulation, incise::Error> {
         let (low, high) = self.ends();
-        let far = MaterialSpec {
-            regions: vec![Region::HalfSpace {
-                point: [0.5 * (low + high), 0.0, 0.0],
-                normal: [1.0, 0.0, 0.0],
-            }],
-            density: Some(self.material.density * self.density_ratio),
-            ..MaterialSpec::default()
-        };
+        let far = MaterialSpec::default().with(|spec| {
+            spec.regions = vec![Region::half_space(
+                [0.5 * (low + high), 0.0, 0.0],
+                [1.0, 0.0, 0.0],
+            )];
+            spec.density = Some(self.material.density * self.density_ratio);
+        });
         let body = Body::new(self.mesh.clone())
             .young_modulus(self.material.young_modulus)
             .poisson_ratio(self.material.poisson_ratio)
@@ -246,14 +245,10 @@ impl Extreme {
             .pinned(|x| self.held && x.x == low);
         let mut builder = Simulation::builder();
         builder.gravity(self.gravity().unwrap_or(DVec3::ZERO));
-        builder.solver(SolverSpec {
-            time_step: self.time_step,
-            ..solver
-        });
-        builder.report(ReportSpec {
-            quantities: vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa],
-            ..ReportSpec::default()
-        });
+        builder.solver(solver.with(|spec| spec.time_step = self.time_step));
+        builder.report(ReportSpec::default().with(|spec| {
+            spec.quantities = vec![Quantity::Energy, Quantity::Volume, Quantity::Kappa];
+        }));
         builder.add_body(match self.density_ratio {
             1.0 => body,
             _ => body.material(far),

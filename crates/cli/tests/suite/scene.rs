@@ -71,10 +71,7 @@ fn the_commented_scene_has_every_default() {
     let text = sandbox.good(&["scene", "--defaults"]);
     let mut scene = Scene::from_toml(&text).unwrap();
     assert!(scene.body[0].shape.take().is_some());
-    let expected = Scene {
-        body: vec![BodySpec::default()],
-        ..Scene::default()
-    };
+    let expected = Scene::default().with(|spec| spec.body = vec![BodySpec::default()]);
     assert_eq!(scene, expected);
     sandbox.write("scene.toml", &text);
     let checked = sandbox.good(&["scene", "--check", "scene.toml"]);

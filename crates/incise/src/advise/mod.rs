@@ -41,6 +41,7 @@ const ROUNDS: u32 = 2;
 
 /// Conditions of a search for settings by [`advise`].
 #[derive(Clone, Copy, Debug)]
+#[non_exhaustive]
 pub struct AdviseSettings {
     /// Time budget of a frame in ms, positive.
     pub budget_ms: f64,
@@ -50,8 +51,21 @@ pub struct AdviseSettings {
     pub threads: Option<usize>,
 }
 
+impl AdviseSettings {
+    /// A time budget of a frame in ms and a number of measured frames, on rayon's pool.
+    #[must_use]
+    pub fn new(budget_ms: f64, frames: u32) -> Self {
+        Self {
+            budget_ms,
+            frames,
+            threads: None,
+        }
+    }
+}
+
 /// Settings of the solver with their measured time and error.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Measured {
     /// Short name of the settings.
     pub name: String,
@@ -71,6 +85,7 @@ pub struct Measured {
 
 /// The reference of an [`Advice`].
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct ReferenceSummary {
     /// Method that computed the reference.
     pub kind: ReferenceKind,
@@ -86,6 +101,7 @@ pub struct ReferenceSummary {
 
 /// Result of [`advise`]: measured settings and the recommended ones.
 #[derive(Clone, Debug, Serialize)]
+#[non_exhaustive]
 pub struct Advice {
     /// Time budget of a frame in ms, from [`AdviseSettings::budget_ms`].
     pub budget_ms: f64,
@@ -149,7 +165,7 @@ pub fn default_frames(scene: &Scene) -> u32 {
 ///     fixed = [{ half_space = { point = [-0.45, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] } }]
 ///     "#,
 /// )?;
-/// let question = AdviseSettings { budget_ms: 1e3, frames: 2, threads: Some(1) };
+/// let question = AdviseSettings::new(1e3, 2);
 /// let advice = advise(&scene, &question)?;
 /// let best = &advice.measured[advice.best.expect("a second is enough")];
 /// println!("{}: {:.2} ms, {:.3} % off\n{}", best.name, best.ms, best.error.largest, best.solver);

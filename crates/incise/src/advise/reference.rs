@@ -18,6 +18,7 @@ use crate::scene::{Backend, Method, Precision, Scene, SolverSpec, Substeps};
 /// Method that computes a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum ReferenceKind {
     /// Implicit Euler with Newton's method, extrapolated.
     Newton,

@@ -8,6 +8,7 @@ use super::Region;
 /// A part of a body that is held or moved along a path. A cut through the part leaves both sides attached.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct AttachmentSpec {
     /// Number of the body, counted from 0.
     #[serde(default)]
@@ -27,6 +28,13 @@ pub struct AttachmentSpec {
     #[serde(default)]
     #[schemars(extend("unit" = "m/N"), range(min = 0.0, max = 1e9))]
     pub compliance: f64,
+}
+
+impl Default for AttachmentSpec {
+    /// An attachment of no particles of the first body.
+    fn default() -> Self {
+        Self::new(0, Vec::new())
+    }
 }
 
 fn at_once() -> [u64; 2] {
@@ -55,6 +63,7 @@ impl AttachmentSpec {
 /// A rotation about an axis at a constant rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct PathRotationSpec {
     /// Direction of the axis.
     pub axis: [f64; 3],
@@ -65,4 +74,15 @@ pub struct PathRotationSpec {
     #[serde(default)]
     #[schemars(extend("unit" = "m"))]
     pub center: [f64; 3],
+}
+
+impl Default for PathRotationSpec {
+    /// The z axis, through the origin, and an angle of 0.
+    fn default() -> Self {
+        Self {
+            axis: [0.0, 0.0, 1.0],
+            angle_degrees: 0.0,
+            center: [0.0; 3],
+        }
+    }
 }

@@ -10,6 +10,7 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// other. Bodies that may touch are solved together, with the largest of their numbers of substeps.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ContactSpec {
     /// Coefficient of friction.
     #[serde(default = "rough")]
@@ -67,6 +68,7 @@ fn quick() -> f64 {
 /// # Ok::<(), incise::Error>(())
 /// ```
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
 pub enum ContactPairs {
     /// All pairs of bodies.
     #[default]

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 /// Settings of all cuts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct CuttingSpec {
     /// Largest volume of a crumb, in mean volumes of the original tets. A smaller part does not come off but stays with
     /// the other side of the cut, if that is at least eight times as large as a crumb; 0 lets every part come off.

@@ -4,8 +4,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// A distance constraint between two particles: a suture, a spring or a rod. Cuts leave it in place.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct DistanceSpec {
     /// First end.
     pub from: EndSpec,
@@ -23,13 +24,34 @@ pub struct DistanceSpec {
     pub tension_only: bool,
 }
 
+impl DistanceSpec {
+    /// A rod between two points whose length is their distance at rest.
+    #[must_use]
+    pub fn new(from: EndSpec, to: EndSpec) -> Self {
+        Self {
+            from,
+            to,
+            ..Self::default()
+        }
+    }
+}
+
 /// An end of a distance constraint: the particle of a body that is nearest to a point at rest.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct EndSpec {
     /// Number of the body, counted from 0.
     pub body: usize,
     /// Point in the world.
     #[schemars(extend("unit" = "m"))]
     pub point: [f64; 3],
+}
+
+impl EndSpec {
+    /// The particle of a body that is nearest at rest to a point of the world, in m.
+    #[must_use]
+    pub const fn new(body: usize, point: [f64; 3]) -> Self {
+        Self { body, point }
+    }
 }

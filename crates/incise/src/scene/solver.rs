@@ -13,8 +13,19 @@ use crate::Error;
 /// Settings of the solver.
 ///
 /// Some defaults depend on the method: see [`SolverSpec::of`]. Those and a preset's are applied when a scene is read.
+///
+/// ```
+/// use incise::scene::{SleepSpec, SolverSpec};
+///
+/// let solver = SolverSpec::default().with(|solver| {
+///     solver.substeps = 20.into();
+///     solver.sleep = Some(SleepSpec::default());
+/// });
+/// # assert_eq!((solver.substeps, solver.iterations), (20.into(), 1));
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
+#[non_exhaustive]
 pub struct SolverSpec {
     /// Other defaults for the keys of this table: `paper`, the settings of the paper's experiments.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -125,6 +136,7 @@ impl Default for SolverSpec {
 /// Floating-point precision of the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Precision {
     /// Single on a GPU and wherever the substep is long enough for it, else double. Double for two-level VBD with an
     /// accuracy.
@@ -151,6 +163,7 @@ impl Precision {
 /// Compute device of a scene.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
+#[non_exhaustive]
 pub enum Backend {
     /// The processor.
     #[default]
@@ -170,6 +183,7 @@ impl Backend {
 /// Rebuilding of clusters and colors in the background.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct ReclusterSpec {
     /// Degradation at which clusters and colors are rebuilt: the number of colors over that after the last rebuild, or
     /// the mean cluster size after the last rebuild over the present one, whichever is larger.
@@ -179,6 +193,15 @@ pub struct ReclusterSpec {
     /// Frames after which the rebuilt ones are taken. A frame that comes before they are ready waits for them.
     #[serde(default = "ten")]
     pub frames: NonZeroU32,
+}
+
+impl Default for ReclusterSpec {
+    fn default() -> Self {
+        Self {
+            threshold: five_quarters(),
+            frames: ten(),
+        }
+    }
 }
 
 fn five_quarters() -> f64 {
@@ -191,6 +214,7 @@ fn ten() -> NonZeroU32 {
 /// Conditions under which a body falls asleep.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SleepSpec {
     /// Largest speed of a particle that counts as rest. Choose it below the speed after one frame of free fall (0.16 m/s
     /// at 0.016 s), or a body falls asleep before it falls.
@@ -201,6 +225,20 @@ pub struct SleepSpec {
     #[serde(default = "half_a_second")]
     #[schemars(extend("unit" = "s", "exclusiveMinimum" = 0))]
     pub time: f64,
+}
+
+impl SleepSpec {
+    /// Sleep of bodies whose particles are not faster than a speed in m/s, after a time in s.
+    #[must_use]
+    pub const fn new(speed: f64, time: f64) -> Self {
+        Self { speed, time }
+    }
+}
+
+impl Default for SleepSpec {
+    fn default() -> Self {
+        Self::new(millimeter_per_second(), half_a_second())
+    }
 }
 
 fn millimeter_per_second() -> f64 {

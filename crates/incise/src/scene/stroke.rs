@@ -10,10 +10,21 @@ use serde::{Deserialize, Serialize};
 use super::Region;
 
 /// A cut.
+///
+/// ```
+/// use incise::scene::StrokeSpec;
+///
+/// let slice = StrokeSpec::plane(4, [0.0; 3], [1.0, 0.0, 0.0]);
+/// let blade = vec![[0.0, -1.0, 0.6], [0.0, 1.0, 0.6]];
+/// let slit = StrokeSpec::sweep([10, 40], blade, vec![[0.0; 3], [0.0, 0.0, -1.2]]).with_snap(0.0);
+/// # assert_eq!([slice, slit].map(|stroke| stroke.last_frame()), [4, 40]);
+/// ```
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "lowercase", deny_unknown_fields)]
+#[non_exhaustive]
 pub enum StrokeSpec {
     /// A whole plane, cut at once.
+    #[non_exhaustive]
     Plane {
         /// Frame at whose start the cut is made.
         frame: u64,
@@ -28,6 +39,7 @@ pub enum StrokeSpec {
         snap: f64,
     },
     /// A blade moved along a path, cutting as it goes.
+    #[non_exhaustive]
     Sweep {
         /// Frames at whose start the blade is at the start and at the end of the path.
         frames: [u64; 2],
@@ -46,6 +58,7 @@ pub enum StrokeSpec {
         solid: Option<SolidBladeSpec>,
     },
     /// A rectangle, cut at once.
+    #[non_exhaustive]
     Rectangle {
         /// Frame at whose start the cut is made.
         frame: u64,
@@ -64,6 +77,7 @@ pub enum StrokeSpec {
         snap: f64,
     },
     /// A triangle surface, open or closed, cut at once.
+    #[non_exhaustive]
     Surface {
         /// Frame at whose start the cut is made.
         frame: u64,
@@ -78,6 +92,7 @@ pub enum StrokeSpec {
         snap: f64,
     },
     /// A cut around a region, made at once: the inside comes off as a piece.
+    #[non_exhaustive]
     Punch {
         /// Frame at whose start the cut is made.
         frame: u64,
@@ -89,6 +104,7 @@ pub enum StrokeSpec {
         snap: f64,
     },
     /// Tets that are removed at once: those whose centers lie in a region.
+    #[non_exhaustive]
     Remove {
         /// Frame at whose start the tets are removed.
         frame: u64,
@@ -101,6 +117,7 @@ pub enum StrokeSpec {
 /// apart and bears the force. Not on a GPU, nor with method `vbd`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[non_exhaustive]
 pub struct SolidBladeSpec {
     /// Thickness behind the wedge.
     #[schemars(extend("unit" = "m"), range(min = 1e-9, max = 1e3))]
@@ -117,7 +134,124 @@ pub struct SolidBladeSpec {
     pub friction: f64,
 }
 
+impl SolidBladeSpec {
+    /// A blade without friction, by its thickness and height in m and the angle of its wedge in degrees.
+    #[must_use]
+    pub const fn new(thickness: f64, wedge_angle_degrees: f64, height: f64) -> Self {
+        Self {
+            thickness,
+            wedge_angle_degrees,
+            height,
+            friction: 0.0,
+        }
+    }
+}
+
+impl Default for SolidBladeSpec {
+    /// A blade for bodies of about 1 m: 1 cm thick, a wedge of 20 degrees, 0.5 m high.
+    fn default() -> Self {
+        Self::new(0.01, 20.0, 0.5)
+    }
+}
+
 impl StrokeSpec {
+    /// The whole plane through a point, in m, cut at the start of a frame; the normal may have any length.
+    #[must_use]
+    pub fn plane(frame: u64, point: [f64; 3], normal: [f64; 3]) -> Self {
+        Self::Plane {
+            frame,
+            point,
+            normal,
+            snap: tenth(),
+        }
+    }
+
+    /// A blade, a polyline in m, whose offsets along a path, in m, reach from the start of one frame to that of
+    /// another.
+    #[must_use]
+    pub fn sweep(frames: [u64; 2], blade: Vec<[f64; 3]>, path: Vec<[f64; 3]>) -> Self {
+        Self::Sweep {
+            frames,
+            blade,
+            path,
+            snap: tenth(),
+            solid: None,
+        }
+    }
+
+    /// A blade with a body, which pushes the sides of its cut apart; otherwise [`StrokeSpec::sweep`].
+    #[must_use]
+    pub fn solid_sweep(
+        frames: [u64; 2],
+        blade: Vec<[f64; 3]>,
+        path: Vec<[f64; 3]>,
+        solid: SolidBladeSpec,
+    ) -> Self {
+        Self::Sweep {
+            frames,
+            blade,
+            path,
+            snap: tenth(),
+            solid: Some(solid),
+        }
+    }
+
+    /// A rectangle, cut at the start of a frame, by its center and the vectors from there to the middles of two adjacent
+    /// sides, in m.
+    #[must_use]
+    pub fn rectangle(frame: u64, center: [f64; 3], half_u: [f64; 3], half_v: [f64; 3]) -> Self {
+        Self::Rectangle {
+            frame,
+            center,
+            half_u,
+            half_v,
+            snap: tenth(),
+        }
+    }
+
+    /// A triangle surface, open or closed, cut at the start of a frame: vertices in m, and three of their numbers for
+    /// each triangle.
+    #[must_use]
+    pub fn surface(frame: u64, points: Vec<[f64; 3]>, triangles: Vec<[u32; 3]>) -> Self {
+        Self::Surface {
+            frame,
+            points,
+            triangles,
+            snap: tenth(),
+        }
+    }
+
+    /// A cut around a region, made at the start of a frame: the inside comes off as a piece.
+    #[must_use]
+    pub fn punch(frame: u64, region: Region) -> Self {
+        Self::Punch {
+            frame,
+            region,
+            snap: tenth(),
+        }
+    }
+
+    /// Removal of the tets whose centers lie in a region, at the start of a frame.
+    #[must_use]
+    pub fn remove(frame: u64, region: Region) -> Self {
+        Self::Remove { frame, region }
+    }
+
+    /// Returns the stroke with a snap distance, a fraction of an edge; 0 turns snapping off. A removal has none and stays
+    /// unchanged.
+    #[must_use]
+    pub fn with_snap(mut self, fraction: f64) -> Self {
+        match &mut self {
+            Self::Plane { snap, .. }
+            | Self::Sweep { snap, .. }
+            | Self::Rectangle { snap, .. }
+            | Self::Surface { snap, .. }
+            | Self::Punch { snap, .. } => *snap = fraction,
+            Self::Remove { .. } => {}
+        }
+        self
+    }
+
     /// Returns whether the stroke has a solid blade.
     #[must_use]
     pub fn is_solid(&self) -> bool {

@@ -136,12 +136,7 @@ impl BodyHandle {
 /// let mut builder = Simulation::builder();
 /// builder.gravity(DVec3::new(0.0, 0.0, -9.81));
 /// builder.add_body(Body::new(bar).young_modulus(2e5).pinned(|x| x.x < -0.4));
-/// builder.add_stroke(StrokeSpec::Plane {
-///     frame: 2,
-///     point: [0.1, 0.0, 0.0],
-///     normal: [1.0, 0.0, 0.0],
-///     snap: 0.1,
-/// });
+/// builder.add_stroke(StrokeSpec::plane(2, [0.1, 0.0, 0.0], [1.0, 0.0, 0.0]));
 /// let mut simulation = builder.build()?;
 /// for _ in 0..4 {
 ///     simulation.step()?;

@@ -59,12 +59,7 @@ impl Simulation {
     /// builder.ground(-0.5, 0.5);
     /// builder.add_body(Body::new(generate(Shape::Sphere, 300)?));
     /// let mut simulation = builder.build()?;
-    /// let plate = simulation.add_collider(&ColliderSpec::Plane {
-    ///     point: [0.0, 0.0, 0.6],
-    ///     normal: [0.0, 0.0, -1.0],
-    ///     friction: 0.2,
-    ///     velocity: [0.0; 3],
-    /// })?;
+    /// let plate = simulation.add_collider(&ColliderSpec::plane([0.0, 0.0, 0.6], [0.0, 0.0, -1.0]))?;
     /// for frame in 1..=10 {
     ///     simulation.move_collider(plate, DVec3::Z * (0.6 - 0.03 * f64::from(frame)))?;
     ///     simulation.step()?;
@@ -166,7 +161,7 @@ impl Simulation {
     /// let scene = Scene::from_toml("[contact]\n[[body]]\nshape = { kind = \"box\", tets = 200 }")?;
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.step()?;
-    /// simulation.set_contact(&ContactSpec { friction: 0.0, ..ContactSpec::default() })?;
+    /// simulation.set_contact(&ContactSpec::default().with(|contact| contact.friction = 0.0))?;
     /// simulation.step()?;
     /// # Ok::<(), incise::Error>(())
     /// ```
@@ -215,7 +210,7 @@ impl Simulation {
     ///
     /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"beam\", tets = 300 }")?;
     /// let mut simulation = Simulation::new(&scene)?;
-    /// let end = Region::HalfSpace { point: [0.45, 0.0, 0.0], normal: [1.0, 0.0, 0.0] };
+    /// let end = Region::half_space([0.45, 0.0, 0.0], [1.0, 0.0, 0.0]);
     /// let attachment = simulation.add_attachment(&AttachmentSpec::new(0, vec![end]))?;
     /// for frame in 1..=10 {
     ///     let offset = DVec3::Z * 0.01 * f64::from(frame);
@@ -328,14 +323,11 @@ impl Simulation {
     /// let mut simulation = Simulation::new(&Scene::from_toml(&scene)?)?;
     /// simulation.set_velocities(|x| x.signum())?;
     /// simulation.step()?;
-    /// let ends = [-0.5, 0.5].map(|x| [x, 0.0, 0.0]);
-    /// simulation.add_distance(&DistanceSpec {
-    ///     from: EndSpec { body: 0, point: ends[0] },
-    ///     to: EndSpec { body: 1, point: ends[1] },
-    ///     length: Some(1.2),
-    ///     compliance: 0.0,
-    ///     tension_only: true,
-    /// })?;
+    /// let ends = [EndSpec::new(0, [-0.5, 0.0, 0.0]), EndSpec::new(1, [0.5, 0.0, 0.0])];
+    /// let mut thread = DistanceSpec::new(ends[0], ends[1]);
+    /// thread.length = Some(1.2);
+    /// thread.tension_only = true;
+    /// simulation.add_distance(&thread)?;
     /// for _ in 0..60 {
     ///     simulation.step()?;
     /// }

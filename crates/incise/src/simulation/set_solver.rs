@@ -86,7 +86,7 @@ impl Simulation {
     /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"sphere\", tets = 300 }")?;
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.step()?;
-    /// let spec = SolverSpec { iterations: 3, ..simulation.solver_spec().clone() };
+    /// let spec = simulation.solver_spec().clone().with(|solver| solver.iterations = 3);
     /// simulation.set_solver(&spec)?;
     /// simulation.step()?;
     /// simulation.set_solver(&SolverSpec::of(Method::Vbd))?;
@@ -174,7 +174,7 @@ impl Simulation {
     /// use std::sync::Arc;
     ///
     /// use incise::gpu::{GpuContext, GpuError, GpuOptions};
-    /// use incise::scene::{Backend, SolverSpec};
+    /// use incise::scene::Backend;
     /// use incise::{Scene, Simulation};
     ///
     /// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
@@ -186,7 +186,7 @@ impl Simulation {
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.offer_device(gpu);
     /// simulation.step()?;
-    /// let spec = SolverSpec { backend: Backend::Gpu, ..simulation.solver_spec().clone() };
+    /// let spec = simulation.solver_spec().clone().with(|solver| solver.backend = Backend::Gpu);
     /// simulation.set_solver(&spec)?;
     /// assert_eq!(simulation.step()?.backend, "gpu");
     /// # Ok::<(), incise::Error>(())

@@ -140,12 +140,7 @@ impl Simulation {
     /// let mut simulation = Simulation::new(&scene)?;
     /// simulation.step()?;
     /// let before = simulation.snapshot()?;
-    /// simulation.cut(StrokeSpec::Plane {
-    ///     frame: 0,
-    ///     point: [0.01, 0.0, 0.0],
-    ///     normal: [1.0, 0.0, 0.0],
-    ///     snap: 0.1,
-    /// })?;
+    /// simulation.cut(StrokeSpec::plane(0, [0.01, 0.0, 0.0], [1.0, 0.0, 0.0]))?;
     /// assert_eq!(simulation.step()?.pieces, 2);
     /// simulation.restore(&before)?;
     /// assert_eq!(simulation.report().pieces, 1);

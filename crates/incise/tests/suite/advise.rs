@@ -49,11 +49,10 @@ fn errors_fall_with_substeps() {
     let reference = Reference::newton(&scene, frames, 4).unwrap();
     let n = accurate_substeps(&scene).unwrap();
     let error = |substeps: u32| {
-        let solver = SolverSpec {
-            substeps: substeps.into(),
-            precision: Precision::F64,
-            ..SolverSpec::default()
-        };
+        let solver = SolverSpec::default().with(|spec| {
+            spec.substeps = substeps.into();
+            spec.precision = Precision::F64;
+        });
         let motion = Motion::of(&with(&scene, &solver), frames, Some(1)).unwrap();
         motion.deviation(&reference.motion).largest
     };
@@ -76,11 +75,8 @@ fn errors_fall_with_substeps() {
 #[test]
 fn the_advised_scene_is_as_accurate_as_it_says() {
     let frames = 6;
-    let question = AdviseSettings {
-        budget_ms: 1e3,
-        frames,
-        threads: Some(1),
-    };
+    let mut question = AdviseSettings::new(1e3, frames);
+    question.threads = Some(1);
     let advice = advise(&scene(BEAM), &question).unwrap();
     assert_eq!(advice.reference.kind, ReferenceKind::Newton);
     let reference = Reference::newton(&scene(BEAM), frames, 4).unwrap();

@@ -113,10 +113,10 @@ fn named_keys_are_not_overridden() {
         assert!(!report.bodies.iter().any(vbd), "{keys}");
     }
     let mut grounded = beam("1e9", "");
-    grounded.world.ground = Some(GroundSpec {
-        height: -1.0,
-        friction: 0.0,
-    });
+    grounded.world.ground = Some(GroundSpec::default().with(|spec| {
+        spec.height = -1.0;
+        spec.friction = 0.0;
+    }));
     assert_eq!(
         chosen(&simulation(&grounded)).0,
         ChosenMethod::GaussSeidel,

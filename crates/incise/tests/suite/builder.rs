@@ -9,12 +9,7 @@ use incise::{Body, Simulation, SimulationBuilder};
 use crate::support::scene;
 
 fn stroke() -> StrokeSpec {
-    StrokeSpec::Plane {
-        frame: 3,
-        point: [0.1, 0.0, 0.0],
-        normal: [1.0, 0.0, 0.2],
-        snap: 0.1,
-    }
+    StrokeSpec::plane(3, [0.1, 0.0, 0.0], [1.0, 0.0, 0.2])
 }
 
 /// Two bodies, an obstacle and a cut, given both ways.
@@ -53,10 +48,7 @@ fn meshes_in_memory_move_as_those_of_a_scene() {
     builder
         .gravity(DVec3::new(0.0, 0.0, -9.81))
         .ground(-0.4, 0.3)
-        .solver(SolverSpec {
-            accuracy: Some(0.2),
-            ..SolverSpec::default()
-        })
+        .solver(SolverSpec::default().with(|spec| spec.accuracy = Some(0.2)))
         .threads(2);
     let beam = Body::new(generate(Shape::Beam, 300).unwrap())
         .young_modulus(3e4)
@@ -131,10 +123,7 @@ fn mistakes_are_named() {
         b.add_body(Body::new(flat.clone()));
     });
     assert!(found.starts_with("body[0].mesh"), "{found}");
-    let region = Region::Sphere {
-        center: [0.0; 3],
-        radius: -1.0,
-    };
+    let region = Region::sphere([0.0; 3], -1.0);
     let mut scene = scene("[[body]]\nshape = { kind = \"box\", tets = 300 }");
     scene.body[0].fixed = vec![region];
     let found = SimulationBuilder::from_scene(scene).build().unwrap_err();

@@ -85,6 +85,7 @@ fn sphere(scene: &mut Scene) -> (&mut [f64; 3], &mut f64, &mut f64, &mut [f64; 3
         radius,
         friction,
         velocity,
+        ..
     } = &mut scene.collider[1]
     else {
         panic!("the second collider is a sphere");
@@ -353,10 +354,7 @@ fn links_carry_a_body() {
 #[test]
 fn an_end_of_a_link_is_the_nearest_particle_of_its_body() {
     let mut scene = everything();
-    scene.distance[0].to = EndSpec {
-        body: 1,
-        point: scene.distance[0].from.point,
-    };
+    scene.distance[0].to = EndSpec::new(1, scene.distance[0].from.point);
     // The other body's nearest particle is another one.
     simulation(&scene).step().unwrap();
 }

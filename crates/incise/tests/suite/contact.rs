@@ -15,22 +15,16 @@ pub(crate) const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 const DENSITY: f64 = 1000.0;
 
 pub(crate) fn solver(precision: Precision, substeps: u32) -> SolverSpec {
-    SolverSpec {
-        precision,
-        substeps: substeps.into(),
-        method: Method::GaussSeidel,
-        ..SolverSpec::default()
-    }
+    SolverSpec::default().with(|spec| {
+        spec.precision = precision;
+        spec.substeps = substeps.into();
+        spec.method = Method::GaussSeidel;
+    })
 }
 
 /// A plane that cuts in a frame.
 pub(crate) fn cut(frame: u64, point: DVec3, normal: DVec3) -> StrokeSpec {
-    StrokeSpec::Plane {
-        frame,
-        point: point.to_array(),
-        normal: normal.to_array(),
-        snap: 0.1,
-    }
+    StrokeSpec::plane(frame, point.to_array(), normal.to_array())
 }
 
 /// A cube of edge 1/4 of 4 x 4 x 4 cells with dyadic coordinates, so that tets are at rest to the bit.
@@ -185,10 +179,7 @@ pub(crate) fn stack(count: u32, precision: Precision) -> SimulationBuilder {
         let cube = Body::new(kuhn_box([2; 3], DVec3::splat(EDGE))).position(at);
         builder.add_body(cube.young_modulus(2e7).damping(0.005));
     }
-    builder.contact(ContactSpec {
-        friction: 0.5,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
     builder
 }
 
@@ -231,10 +222,7 @@ fn gained_on_a_slope(friction: f64, cells: usize) -> f64 {
     let block = kuhn_box([3; 3], DVec3::splat(0.1875));
     let block = Body::new(block).position(dvec3(0.05, 0.15, 0.125));
     builder.add_body(block.young_modulus(2e5).damping(0.01));
-    builder.contact(ContactSpec {
-        friction,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = friction));
     let mut simulation = builder.build().unwrap();
     let particles = simulation.positions().len();
     let first = particles - 64;
@@ -319,10 +307,7 @@ fn an_overlap_at_the_start_parts_slowly() {
     builder.solver(solver(Precision::F64, 20));
     builder.add_body(cube(DVec3::ZERO));
     builder.add_body(cube(dvec3(0.02, 0.01, EDGE - depth)));
-    builder.contact(ContactSpec {
-        recovery_time,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.recovery_time = recovery_time));
     let mut simulation = builder.build().unwrap();
     let particles = simulation.positions().len();
     let half = particles / 2;
@@ -424,22 +409,18 @@ fn halves_that_are_pushed_together_again_do_not_overlap() {
         builder.contact(ContactSpec::default());
         builder.add_stroke(cut(1, DVec3::ZERO, DVec3::X));
         for side in [-1.0, 1.0] {
-            let cap = Region::HalfSpace {
-                point: [0.2 * side, 0.0, 0.0],
-                normal: [side, 0.0, 0.0],
-            };
+            let cap = Region::half_space([0.2 * side, 0.0, 0.0], [side, 0.0, 0.0]);
             let to = |x: f64, y: f64| [x * side, y * side, 0.0];
-            builder.add_attachment(AttachmentSpec {
-                frames: [2, 82],
-                path: vec![
+            builder.add_attachment(AttachmentSpec::new(0, vec![cap]).with(|spec| {
+                spec.frames = [2, 82];
+                spec.path = vec![
                     to(0.0, 0.0),
                     to(0.1, 0.0),
                     to(0.1, 0.5 * shift),
                     to(0.0, 0.5 * shift),
                     to(-0.0125 * 0.5, 0.5 * shift),
-                ],
-                ..AttachmentSpec::new(0, vec![cap])
-            });
+                ];
+            }));
         }
         let mut simulation = builder.build().unwrap();
         for _ in 0..110 {
@@ -467,10 +448,7 @@ pub(crate) fn busy(precision: Precision, threads: usize) -> SimulationBuilder {
         .threads(threads);
     builder.add_body(cube(DVec3::ZERO));
     builder.add_body(cube(dvec3(0.07, 0.03, 0.27)));
-    builder.contact(ContactSpec {
-        friction: 0.1,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.1));
     builder.add_stroke(cut(3, dvec3(0.2, 0.1, 0.4), dvec3(1.0, 0.2, 0.8)));
     builder.add_stroke(cut(14, dvec3(0.1, 0.1, 0.1), dvec3(0.3, 1.0, 0.2)));
     builder
@@ -605,10 +583,8 @@ fn only_pairs_that_are_named_touch() {
     for z in [0.0, 0.25, 0.5] {
         builder.add_body(cube(dvec3(0.0, 0.0, z)).damping(0.02));
     }
-    builder.contact(ContactSpec {
-        pairs: ContactPairs::Only(vec![[1, 0]]),
-        ..ContactSpec::default()
-    });
+    builder
+        .contact(ContactSpec::default().with(|spec| spec.pairs = ContactPairs::Only(vec![[1, 0]])));
     let mut simulation = builder.build().unwrap();
     let particles = simulation.positions().len() / 3;
     let [first, second, third] = [0, 1, 2].map(|b| {
@@ -649,13 +625,7 @@ fn a_body_that_is_added_lies_on_the_others() {
 #[test]
 fn a_stack_sleeps_as_a_whole() {
     let mut builder = Simulation::builder();
-    let spec = SolverSpec {
-        sleep: Some(SleepSpec {
-            speed: 1e-2,
-            time: 0.2,
-        }),
-        ..solver(Precision::F32, 20)
-    };
+    let spec = solver(Precision::F32, 20).with(|spec| spec.sleep = Some(SleepSpec::new(1e-2, 0.2)));
     builder.gravity(GRAVITY).ground(0.0, 0.5).solver(spec);
     for z in [0.0, 0.25, 0.5] {
         builder.add_body(cube(dvec3(0.0, 0.0, z)).damping(0.1));
@@ -670,10 +640,7 @@ fn a_stack_sleeps_as_a_whole() {
     assert!(simulation.positions() == still && simulation.events().is_empty());
     assert_eq!(simulation.contacts().len(), 2);
     simulation
-        .set_contact(&ContactSpec {
-            friction: 0.0,
-            ..ContactSpec::default()
-        })
+        .set_contact(&ContactSpec::default().with(|spec| spec.friction = 0.0))
         .unwrap();
     simulation.step().unwrap();
     assert_eq!(simulation.report().bodies[0].asleep, Some(false));
@@ -694,10 +661,7 @@ fn friction_changes_live() {
             .young_modulus(2e5)
             .damping(0.05),
     );
-    let rough = ContactSpec {
-        friction: 0.8,
-        ..ContactSpec::default()
-    };
+    let rough = ContactSpec::default().with(|spec| spec.friction = 0.8);
     builder.contact(rough.clone());
     let mut simulation = builder.build().unwrap();
     let all = simulation.positions().len();
@@ -708,26 +672,16 @@ fn friction_changes_live() {
     let stuck = center(&simulation, block.clone()).x - before;
     assert!(stuck.abs() < 1e-3, "{stuck}");
     simulation
-        .set_contact(&ContactSpec {
-            friction: 0.1,
-            ..rough.clone()
-        })
+        .set_contact(&rough.clone().with(|spec| spec.friction = 0.1))
         .unwrap();
     steps(&mut simulation, 10);
     let slid = center(&simulation, block).x - before - stuck;
     // a = 3 - 0.1 · 9, for 0.16 s.
     assert!((slid - 0.5 * 2.1 * 0.16 * 0.16).abs() < 5e-3, "{slid}");
-    let others = ContactSpec {
-        pairs: ContactPairs::Only(vec![[0, 1]]),
-        ..rough.clone()
-    };
-    for bad in [
-        others,
-        ContactSpec {
-            friction: -1.0,
-            ..rough
-        },
-    ] {
+    let others = rough
+        .clone()
+        .with(|spec| spec.pairs = ContactPairs::Only(vec![[0, 1]]));
+    for bad in [others, rough.with(|spec| spec.friction = -1.0)] {
         assert!(simulation.set_contact(&bad).is_err());
     }
     let mut bare = simulation_without_contact();
@@ -784,10 +738,7 @@ fn methods_without_contact_are_refused() {
         let before = simulation.solver_spec().clone();
         assert!(
             simulation
-                .set_solver(&SolverSpec {
-                    method,
-                    ..before.clone()
-                })
+                .set_solver(&before.clone().with(|spec| spec.method = method))
                 .is_err()
         );
         assert_eq!(*simulation.solver_spec(), before);
@@ -848,10 +799,7 @@ fn a_thickness_parts_bodies_but_not_a_cut() {
     builder.add_body(cube(DVec3::ZERO));
     builder.add_body(cube(dvec3(0.0, 0.0, EDGE)));
     let thickness = 4e-3;
-    builder.contact(ContactSpec {
-        thickness,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.thickness = thickness));
     builder.add_stroke(cut(1, DVec3::splat(0.15625), DVec3::X));
     let mut simulation = builder.build().unwrap();
     steps_of(&mut simulation, 40);
@@ -901,12 +849,11 @@ fn pieces_of_a_body_alone_touch_without_self_contact() {
     for at in [DVec3::ZERO, dvec3(0.0, 0.0, EDGE), dvec3(2.0, 0.0, 0.0)] {
         builder.add_body(cube(at).young_modulus(1e6).damping(0.005));
     }
-    builder.contact(ContactSpec {
-        pairs: ContactPairs::Only(vec![[0, 1]]),
-        self_contact: false,
-        friction: 0.0,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| {
+        spec.pairs = ContactPairs::Only(vec![[0, 1]]);
+        spec.self_contact = false;
+        spec.friction = 0.0;
+    }));
     let middle = dvec3(2.0 + 0.5 * EDGE, 0.5 * EDGE, 0.5 * EDGE);
     builder.add_stroke(cut(1, middle, dvec3(0.5, 0.0, 1.0)));
     let mut simulation = builder.build().unwrap();

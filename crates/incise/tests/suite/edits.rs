@@ -7,20 +7,12 @@ use incise::scene::{ColliderSpec, Precision, SolverSpec, StrokeSpec};
 use incise::{Body, Event, Simulation, SimulationBuilder};
 
 fn ball(center: DVec3) -> ColliderSpec {
-    ColliderSpec::Sphere {
-        center: center.to_array(),
-        radius: 0.2,
-        friction: 0.3,
-        velocity: [0.0; 3],
-    }
+    ColliderSpec::sphere(center.to_array(), 0.2).with_friction(0.3)
 }
 
 fn box_of_jelly() -> SimulationBuilder {
     let mut builder = Simulation::builder();
-    builder.solver(SolverSpec {
-        precision: Precision::F64,
-        ..SolverSpec::default()
-    });
+    builder.solver(SolverSpec::default().with(|spec| spec.precision = Precision::F64));
     builder.add_body(Body::new(generate(Shape::Box, 300).unwrap()).young_modulus(1e5));
     builder
 }
@@ -39,12 +31,11 @@ fn a_collider_that_is_sent_is_one_with_that_velocity() {
     let velocity = DVec3::new(0.0, 0.1, -1.0);
     let pushed = {
         let mut builder = box_of_jelly();
-        builder.add_collider(ColliderSpec::Sphere {
-            center: start.to_array(),
-            radius: 0.2,
-            friction: 0.3,
-            velocity: velocity.to_array(),
-        });
+        builder.add_collider(
+            ColliderSpec::sphere(start.to_array(), 0.2)
+                .with_friction(0.3)
+                .with_velocity(velocity.to_array()),
+        );
         let mut simulation = builder.build().unwrap();
         let rest = simulation.positions().to_vec();
         frames(&mut simulation, 10);
@@ -164,10 +155,10 @@ fn gravity_can_be_turned_on_and_comes_back_with_a_snapshot() {
         "{fallen}"
     );
     // It is not forgotten when other settings change.
-    let spec = SolverSpec {
-        iterations: 2,
-        ..simulation.solver_spec().clone()
-    };
+    let spec = simulation
+        .solver_spec()
+        .clone()
+        .with(|spec| spec.iterations = 2);
     simulation.set_solver(&spec).unwrap();
     let last = height(&simulation);
     simulation.step().unwrap();
@@ -214,12 +205,7 @@ fn an_impulse_is_the_momentum_it_gives() {
 fn events_tell_a_cut_from_its_begin_to_its_end() {
     let mut simulation = box_of_jelly().build().unwrap();
     simulation
-        .cut(StrokeSpec::Plane {
-            frame: 1,
-            point: [0.07, 0.0, 0.0],
-            normal: [1.0, 0.0, 0.0],
-            snap: 0.1,
-        })
+        .cut(StrokeSpec::plane(1, [0.07, 0.0, 0.0], [1.0, 0.0, 0.0]))
         .unwrap();
     simulation.step().unwrap();
     assert!(simulation.events().is_empty());
@@ -273,12 +259,7 @@ fn goes_through(corners: [DVec3; 3], origin: DVec3, direction: DVec3) -> Option<
 fn a_ray_meets_the_first_triangle() {
     let mut simulation = box_of_jelly().build().unwrap();
     simulation
-        .cut(StrokeSpec::Plane {
-            frame: 0,
-            point: [0.07, 0.0, 0.0],
-            normal: [1.0, 0.0, 0.0],
-            snap: 0.1,
-        })
+        .cut(StrokeSpec::plane(0, [0.07, 0.0, 0.0], [1.0, 0.0, 0.0]))
         .unwrap();
     simulation.step().unwrap();
     simulation

@@ -16,19 +16,18 @@ const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 const WEIGHT: f64 = 9.81;
 
 fn report(every: u64) -> ReportSpec {
-    ReportSpec {
-        every,
-        quantities: vec![Quantity::Force],
-    }
+    ReportSpec::default().with(|spec| {
+        spec.every = every;
+        spec.quantities = vec![Quantity::Force];
+    })
 }
 
 fn solver(precision: Precision) -> SolverSpec {
-    SolverSpec {
-        precision,
-        substeps: 20.into(),
-        method: Method::GaussSeidel,
-        ..SolverSpec::default()
-    }
+    SolverSpec::default().with(|spec| {
+        spec.precision = precision;
+        spec.substeps = 20.into();
+        spec.method = Method::GaussSeidel;
+    })
 }
 
 /// A cube of 0.1 m around a point.
@@ -52,10 +51,7 @@ fn builder() -> SimulationBuilder {
 
 /// The particles above a height.
 fn above(z: f64) -> Region {
-    Region::HalfSpace {
-        point: [0.0, 0.0, z],
-        normal: [0.0, 0.0, 1.0],
-    }
+    Region::half_space([0.0, 0.0, z], [0.0, 0.0, 1.0])
 }
 
 #[track_caller]
@@ -77,12 +73,11 @@ fn an_attachment_feels_the_weight_that_hangs_from_it() {
     for spec in [
         solver(Precision::F32),
         solver(Precision::F64),
-        SolverSpec {
-            two_level: true,
-            iterations: 30,
-            precision: Precision::F64,
-            ..SolverSpec::of(Method::Vbd)
-        },
+        SolverSpec::of(Method::Vbd).with(|spec| {
+            spec.two_level = true;
+            spec.iterations = 30;
+            spec.precision = Precision::F64;
+        }),
     ] {
         let mut builder = builder();
         builder.solver(spec);
@@ -130,10 +125,7 @@ fn what_fixed_particles_are_fixed_to_feels_the_weight() {
 fn a_stack_bears_what_is_above() {
     let mut builder = builder();
     builder.ground(0.0, 0.3);
-    builder.contact(ContactSpec {
-        friction: 0.3,
-        ..ContactSpec::default()
-    });
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.3));
     let all = [0.05, 0.15, 0.25].map(|z| builder.add_body(cube(DVec3::Z * z)));
     let mut simulation = builder.build().unwrap();
     assert_eq!(simulation.bodies(), all);
@@ -168,12 +160,7 @@ fn a_collider_feels_all_bodies() {
     let mut builder = builder();
     builder.add_body(cube(dvec3(0.0, 0.0, 0.05)));
     builder.add_body(cube(dvec3(0.3, 0.0, 0.05)));
-    let plane = |z: f64| ColliderSpec::Plane {
-        point: [0.15, 0.0, z],
-        normal: [0.0, 0.0, 1.0],
-        friction: 0.5,
-        velocity: [0.0; 3],
-    };
+    let plane = |z: f64| ColliderSpec::plane([0.15, 0.0, z], [0.0, 0.0, 1.0]).with_friction(0.5);
     let below = builder.add_collider(plane(-5.0));
     let floor = builder.add_collider(plane(0.0));
     let mut simulation = builder.build().unwrap();
@@ -243,13 +230,9 @@ fn a_sleeping_body_presses_on() {
     for every in [1, 7] {
         let mut builder = builder();
         builder.ground(0.0, 0.5);
-        builder.solver(SolverSpec {
-            sleep: Some(SleepSpec {
-                speed: 2e-2,
-                time: 0.1,
-            }),
-            ..solver(Precision::F64)
-        });
+        builder.solver(
+            solver(Precision::F64).with(|spec| spec.sleep = Some(SleepSpec::new(2e-2, 0.1))),
+        );
         builder.report(report(every));
         builder.add_body(cube(DVec3::Z * 0.05));
         let mut simulation = builder.build().unwrap();

@@ -6,9 +6,7 @@ use incise::gpu::GpuContext;
 use incise::mesh::glam::{DVec3, dvec3};
 use incise::mesh::kuhn_box;
 use incise::meshing::{Shape, generate};
-use incise::scene::{
-    AttachmentSpec, Backend, ContactSpec, Method, Precision, Region, SleepSpec, SolverSpec,
-};
+use incise::scene::{AttachmentSpec, Backend, ContactSpec, Method, Precision, Region, SleepSpec};
 use incise::{Body, Event, Simulation, SimulationBuilder};
 
 use crate::contact::{
@@ -64,10 +62,7 @@ fn contact_is_that_of_the_processor() {
     // With multipliers, and a frame that is divided.
     let iterated = || {
         let mut builder = busy(Precision::F32, 1);
-        builder.solver(SolverSpec {
-            iterations: 2,
-            ..solver(Precision::F32, 5)
-        });
+        builder.solver(solver(Precision::F32, 5).with(|spec| spec.iterations = 2));
         builder
     };
     compare(&gpu, &iterated, 12);
@@ -209,10 +204,7 @@ fn a_block_slides_and_sticks_on_a_device() {
         let block = Body::new(kuhn_box([3; 3], DVec3::splat(0.1875)));
         let block = block.position(dvec3(0.05, 0.15, 0.125));
         builder.add_body(block.young_modulus(2e5).damping(0.01));
-        builder.contact(ContactSpec {
-            friction,
-            ..ContactSpec::default()
-        });
+        builder.contact(ContactSpec::default().with(|spec| spec.friction = friction));
         let mut simulation = builder.build().unwrap();
         let particles = simulation.positions().len();
         let mut at = |frames: u32| {
@@ -245,10 +237,7 @@ fn halves_meet_again_on_a_device() {
     builder.contact(ContactSpec::default());
     builder.add_stroke(cut(1, DVec3::ZERO, DVec3::X));
     for side in [-1.0, 1.0] {
-        let cap = Region::HalfSpace {
-            point: [0.2 * side, 0.0, 0.0],
-            normal: [side, 0.0, 0.0],
-        };
+        let cap = Region::half_space([0.2 * side, 0.0, 0.0], [side, 0.0, 0.0]);
         let path = [
             (0.0, 0.0),
             (0.1, 0.0),
@@ -256,11 +245,10 @@ fn halves_meet_again_on_a_device() {
             (0.0, 0.01),
             (-0.00625, 0.01),
         ];
-        builder.add_attachment(AttachmentSpec {
-            frames: [2, 82],
-            path: path.map(|(x, y)| [x * side, y * side, 0.0]).to_vec(),
-            ..AttachmentSpec::new(0, vec![cap])
-        });
+        builder.add_attachment(AttachmentSpec::new(0, vec![cap]).with(|spec| {
+            spec.frames = [2, 82];
+            spec.path = path.map(|(x, y)| [x * side, y * side, 0.0]).to_vec();
+        }));
     }
     let mut simulation = builder.build().unwrap();
     for _ in 0..110 {
@@ -307,10 +295,10 @@ fn snapshots_and_settings_with_contact_on_a_device() {
             } else {
                 Backend::Cpu
             };
-            let spec = SolverSpec {
-                backend,
-                ..moving.solver_spec().clone()
-            };
+            let spec = moving
+                .solver_spec()
+                .clone()
+                .with(|spec| spec.backend = backend);
             moving.set_solver(&spec).unwrap();
         }
         here.step().unwrap();
@@ -340,13 +328,9 @@ fn bodies_come_and_go_on_a_device() {
         .gravity(GRAVITY)
         .ground(0.0, 0.5)
         .device(gpu)
-        .solver(SolverSpec {
-            sleep: Some(SleepSpec {
-                speed: 1e-2,
-                time: 0.2,
-            }),
-            ..solver(Precision::F32, 20)
-        });
+        .solver(
+            solver(Precision::F32, 20).with(|spec| spec.sleep = Some(SleepSpec::new(1e-2, 0.2))),
+        );
     let bodies = [0.0, 0.26, 0.52].map(|z| builder.add_body(cube(dvec3(0.0, 0.0, z)).damping(0.1)));
     builder.contact(ContactSpec::default());
     let mut simulation = builder.build().unwrap();
@@ -368,10 +352,7 @@ fn bodies_come_and_go_on_a_device() {
     };
     assert_eq!(run(&mut simulation, 150), [began(0, 1), began(1, 2)]);
     assert_eq!(simulation.report().bodies[0].asleep, Some(true));
-    let smooth = ContactSpec {
-        friction: 0.0,
-        ..ContactSpec::default()
-    };
+    let smooth = ContactSpec::default().with(|spec| spec.friction = 0.0);
     simulation.set_contact(&smooth).unwrap();
     simulation.step().unwrap();
     assert_eq!(simulation.report().bodies[0].asleep, Some(false));
@@ -455,10 +436,9 @@ fn methods_without_contact_are_refused_on_a_device() {
     };
     for method in [Method::Jacobi, Method::Chebyshev, Method::Vbd] {
         let mut builder = busy(Precision::F32, 1);
-        builder.device(Arc::clone(&gpu)).solver(SolverSpec {
-            method,
-            ..solver(Precision::F32, 4)
-        });
+        builder
+            .device(Arc::clone(&gpu))
+            .solver(solver(Precision::F32, 4).with(|spec| spec.method = method));
         let error = builder.build().unwrap_err();
         assert_eq!(error.key().as_deref(), Some("solver.method"), "{error}");
     }

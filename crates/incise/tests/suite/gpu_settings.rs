@@ -36,10 +36,7 @@ fn go_on(simulation: &mut Simulation) -> Vec<Vec<u64>> {
 }
 
 fn on(backend: Backend, spec: &SolverSpec) -> SolverSpec {
-    SolverSpec {
-        backend,
-        ..spec.clone()
-    }
+    spec.clone().with(|spec| spec.backend = backend)
 }
 
 #[test]
@@ -50,16 +47,12 @@ fn a_restored_device_run_is_bit_identical() {
     let plain = two_bodies().solver;
     for solver in [
         plain.clone(),
-        SolverSpec {
-            method: Method::Jacobi,
-            iterations: 3,
-            relaxation: 0.05,
-            ..plain.clone()
-        },
-        SolverSpec {
-            clustering: "pressure:64".into(),
-            ..plain
-        },
+        plain.clone().with(|spec| {
+            spec.method = Method::Jacobi;
+            spec.iterations = 3;
+            spec.relaxation = 0.05;
+        }),
+        plain.with(|spec| spec.clustering = "pressure:64".into()),
     ] {
         let mut scene = two_bodies();
         scene.solver = solver;
@@ -85,30 +78,21 @@ fn a_device_at_the_start_is_as_if_set_up_so() {
     let Some(gpu) = gpu("a_device_at_the_start_is_as_if_set_up_so") else {
         return;
     };
-    let plain = SolverSpec {
-        backend: Backend::Gpu,
-        ..two_bodies().solver
-    };
+    let plain = two_bodies().solver.with(|spec| spec.backend = Backend::Gpu);
     for solver in [
-        SolverSpec {
-            substeps: 3.into(),
-            kappa_limit: 0.05,
-            ..plain.clone()
-        },
-        SolverSpec {
-            clustering: "pressure:64".into(),
-            ..plain.clone()
-        },
-        SolverSpec {
-            iterations: 2,
-            ..plain.clone()
-        },
-        SolverSpec {
-            method: Method::Chebyshev,
-            iterations: 3,
-            relaxation: 0.05,
-            ..plain
-        },
+        plain.clone().with(|spec| {
+            spec.substeps = 3.into();
+            spec.kappa_limit = 0.05;
+        }),
+        plain
+            .clone()
+            .with(|spec| spec.clustering = "pressure:64".into()),
+        plain.clone().with(|spec| spec.iterations = 2),
+        plain.with(|spec| {
+            spec.method = Method::Chebyshev;
+            spec.iterations = 3;
+            spec.relaxation = 0.05;
+        }),
     ] {
         let mut scene = two_bodies();
         let [mut from_here, mut from_there] = [
@@ -140,10 +124,7 @@ fn the_state_goes_there_and_comes_back() {
     let mut stays = Simulation::new(&scene).unwrap();
     let mut moves = Simulation::new(&scene).unwrap();
     moves.offer_device(gpu);
-    let limited = SolverSpec {
-        kappa_limit: 0.1,
-        ..scene.solver.clone()
-    };
+    let limited = scene.solver.clone().with(|spec| spec.kappa_limit = 0.1);
     let backends = [
         (Backend::Cpu, &scene.solver),
         (Backend::Gpu, &scene.solver),

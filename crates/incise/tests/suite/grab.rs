@@ -16,8 +16,8 @@ fn free_box(precision: Precision) -> Scene {
 /// One unit of the last place of numbers around 1, times what sums and frames add up.
 fn rounding(precision: Precision) -> f64 {
     match precision {
-        Precision::F32 | Precision::Auto => 1e-5,
         Precision::F64 => 1e-12,
+        _ => 1e-5,
     }
 }
 
@@ -60,12 +60,11 @@ fn take(simulation: &mut Simulation, point: DVec3, radius: f64, compliance: f64)
 
 #[test]
 fn grabbed_particles_reach_the_target() {
-    let vbd = |scene: &Scene| Scene {
-        solver: SolverSpec {
-            precision: scene.solver.precision,
-            ..SolverSpec::of(Method::Vbd)
-        },
-        ..scene.clone()
+    let vbd = |scene: &Scene| {
+        scene.clone().with(|copy| {
+            copy.solver =
+                SolverSpec::of(Method::Vbd).with(|spec| spec.precision = scene.solver.precision);
+        })
     };
     for precision in [Precision::F32, Precision::F64] {
         let scene = free_box(precision);
@@ -354,13 +353,8 @@ fn grabbed_particles_may_be_cut_away() {
         let mut simulation = simulation(&scene);
         let point = dvec3(0.0, 0.0, 0.5);
         let grab = take(&mut simulation, point, 0.3, 0.0);
-        let region = Region::Sphere {
-            center: point.to_array(),
-            radius,
-        };
-        simulation
-            .cut(StrokeSpec::Remove { frame: 0, region })
-            .unwrap();
+        let region = Region::sphere(point.to_array(), radius);
+        simulation.cut(StrokeSpec::remove(0, region)).unwrap();
         for step in 1..=4 {
             let to = point + DVec3::Z * (0.1 * f64::from(step));
             simulation.move_grab(grab, to).unwrap();

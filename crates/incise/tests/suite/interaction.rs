@@ -58,12 +58,7 @@ fn play(simulation: &mut Simulation, acts: &[Act]) {
                 assert!(simulation.end_stroke(stroke).is_err());
             }
             Act::Cut(point, normal) => {
-                let plane = StrokeSpec::Plane {
-                    frame: 0,
-                    point,
-                    normal: (vector(normal) + DVec3::X).to_array(),
-                    snap: 0.1,
-                };
+                let plane = StrokeSpec::plane(0, point, (vector(normal) + DVec3::X).to_array());
                 simulation.cut(plane).unwrap();
             }
             Act::Grab(point, radius, compliance) => {
@@ -105,7 +100,7 @@ proptest! {
         let mut scene = scene(&format!("{world}{bodies}"));
         scene.solver.precision = if single { Precision::F32 } else { Precision::F64 };
         if sleepy {
-            scene.solver.sleep = Some(SleepSpec { speed: 0.5, time: 0.05 });
+            scene.solver.sleep = Some(SleepSpec::new(0.5, 0.05));
         }
         play(&mut simulation(&scene), &acts);
     }

@@ -10,11 +10,10 @@ use incise::{Body, Scene, Simulation, SimulationBuilder};
 /// Three boxes in a row without gravity, each in an island of its own.
 fn row(precision: Precision) -> Simulation {
     let mut builder = Simulation::builder();
-    builder.solver(SolverSpec {
-        precision,
-        substeps: Substeps::Fixed(10),
-        ..SolverSpec::default()
-    });
+    builder.solver(SolverSpec::default().with(|spec| {
+        spec.precision = precision;
+        spec.substeps = Substeps::Fixed(10);
+    }));
     for x in [-2.0, 0.0, 2.0] {
         let mesh = generate(Shape::Box, 200).unwrap();
         builder.add_body(Body::new(mesh).position(dvec3(x, 0.0, 0.0)));
@@ -24,18 +23,10 @@ fn row(precision: Precision) -> Simulation {
 
 /// A rod between the facing sides of two bodies of the row, as long as their distance at rest.
 fn rod(from: usize, to: usize) -> DistanceSpec {
-    let end = |body: usize, side: f64| EndSpec {
-        body,
-        point: [[-2.0, 0.0, 2.0][body] + side, 0.0, 0.0],
-    };
+    let end =
+        |body: usize, side: f64| EndSpec::new(body, [[-2.0, 0.0, 2.0][body] + side, 0.0, 0.0]);
     let side = if from < to { 0.5 } else { -0.5 };
-    DistanceSpec {
-        from: end(from, side),
-        to: end(to, -side),
-        length: None,
-        compliance: 0.0,
-        tension_only: false,
-    }
+    DistanceSpec::new(end(from, side), end(to, -side))
 }
 
 /// The particles of both ends of a rod, and its length at rest.
@@ -153,12 +144,7 @@ fn a_rod_added_at_first_is_one_of_the_scene() {
 fn joined_bodies_keep_cuts_grabs_attachments_and_handles() {
     for precision in [Precision::F32, Precision::F64] {
         let mut simulation = row(precision);
-        let plane = |x: f64| StrokeSpec::Plane {
-            frame: 0,
-            point: [x, 0.01, 0.02],
-            normal: [1.0, 0.1, 0.0],
-            snap: 0.1,
-        };
+        let plane = |x: f64| StrokeSpec::plane(0, [x, 0.01, 0.02], [1.0, 0.1, 0.0]);
         simulation.cut(plane(0.03)).unwrap();
         simulation.cut(plane(2.03)).unwrap();
         simulation.step().unwrap();
@@ -178,10 +164,7 @@ fn joined_bodies_keep_cuts_grabs_attachments_and_handles() {
             simulation.move_grab(grab, point + DVec3::Z * 0.01).unwrap();
             grabs.push((grab, point));
         }
-        let half = Region::HalfSpace {
-            point: [2.45, 0.0, 0.0],
-            normal: [1.0, 0.0, 0.0],
-        };
+        let half = Region::half_space([2.45, 0.0, 0.0], [1.0, 0.0, 0.0]);
         simulation.release(grabs[2].0).unwrap();
         let held = simulation
             .add_attachment(&AttachmentSpec::new(2, vec![half]))
@@ -253,10 +236,7 @@ fn a_join_keeps_what_waits_to_be_improved_and_original_particles() {
     let mut scene = Scene::default();
     scene.cutting.improve = true;
     let mut builder = SimulationBuilder::from_scene(scene);
-    builder.solver(SolverSpec {
-        substeps: Substeps::Fixed(10),
-        ..SolverSpec::default()
-    });
+    builder.solver(SolverSpec::default().with(|spec| spec.substeps = Substeps::Fixed(10)));
     for x in [-2.0, 0.0, 2.0] {
         let mesh = generate(Shape::Box, 200).unwrap();
         builder.add_body(Body::new(mesh).position(dvec3(x, 0.0, 0.0)));
@@ -280,12 +260,7 @@ fn a_join_keeps_what_waits_to_be_improved_and_original_particles() {
     assert!(collapsed(&mut simulation) > 0);
     simulation.check().unwrap();
     simulation
-        .cut(StrokeSpec::Plane {
-            frame: 0,
-            point: [0.0, 0.05, 0.02],
-            normal: [0.1, 1.0, 0.1],
-            snap: 0.0,
-        })
+        .cut(StrokeSpec::plane(0, [0.0, 0.05, 0.02], [0.1, 1.0, 0.1]).with_snap(0.0))
         .unwrap();
     assert!(collapsed(&mut simulation) > 0);
     simulation.check().unwrap();

@@ -231,16 +231,10 @@ fn velocities_are_set_between_frames() {
     for precision in [Precision::F32, Precision::F64] {
         let mut falling = scene(&body("box", 200, [0.0; 3]));
         falling.world.gravity = Some([0.0; 3]);
-        falling.solver.sleep = Some(SleepSpec {
-            speed: 1e-3,
-            time: 0.1,
-        });
+        falling.solver.sleep = Some(SleepSpec::new(1e-3, 0.1));
         falling.solver.precision = precision;
         let mut held = falling.clone();
-        held.body[0].fixed = vec![Region::HalfSpace {
-            point: [-0.4, 0.0, 0.0],
-            normal: [-1.0, 0.0, 0.0],
-        }];
+        held.body[0].fixed = vec![Region::half_space([-0.4, 0.0, 0.0], [-1.0, 0.0, 0.0])];
         let mut free = Simulation::new(&falling).unwrap();
         while free.report().bodies[0].asleep != Some(true) {
             free.step().unwrap();

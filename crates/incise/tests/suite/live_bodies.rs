@@ -12,10 +12,7 @@ use crate::support::state;
 
 fn solved(precision: Precision) -> SimulationBuilder {
     let mut builder = Simulation::builder();
-    builder.solver(SolverSpec {
-        precision,
-        ..SolverSpec::default()
-    });
+    builder.solver(SolverSpec::default().with(|spec| spec.precision = precision));
     builder.gravity(DVec3::NEG_Z * 9.81).ground(-0.6, 0.5);
     builder
 }
@@ -29,12 +26,7 @@ fn slab(x: f64) -> Body {
 }
 
 fn halving(x: f64) -> StrokeSpec {
-    StrokeSpec::Plane {
-        frame: 0,
-        point: [x, 0.0, 0.0],
-        normal: [1.0, 0.1, 0.0],
-        snap: 0.1,
-    }
+    StrokeSpec::plane(0, [x, 0.0, 0.0], [1.0, 0.1, 0.0])
 }
 
 /// Added before the first frame is declared, to the bit; so is a body beside one that was removed.
@@ -164,13 +156,7 @@ fn bodies_come_and_go_among_cuts() {
 #[test]
 fn bad_bodies_are_refused() {
     let mut builder = solved(Precision::F32);
-    builder.solver(SolverSpec {
-        sleep: Some(SleepSpec {
-            speed: 1e-3,
-            time: 0.1,
-        }),
-        ..SolverSpec::default()
-    });
+    builder.solver(SolverSpec::default().with(|spec| spec.sleep = Some(SleepSpec::new(1e-3, 0.1))));
     builder.add_body(ball(0.0));
     let mut simulation = builder.build().unwrap();
     simulation.step().unwrap();
@@ -182,14 +168,10 @@ fn bad_bodies_are_refused() {
         ball(1e10),
         Body::new(torn),
         ball(0.0).pinned_particles([1_000_000]),
-        ball(0.0).material(MaterialSpec {
-            regions: vec![Region::Tets(vec![1_000_000])],
-            ..MaterialSpec::default()
-        }),
-        ball(0.0).material(MaterialSpec {
-            poisson_ratio: Some(0.5),
-            ..MaterialSpec::default()
-        }),
+        ball(0.0).material(
+            MaterialSpec::default().with(|spec| spec.regions = vec![Region::Tets(vec![1_000_000])]),
+        ),
+        ball(0.0).material(MaterialSpec::default().with(|spec| spec.poisson_ratio = Some(0.5))),
     ] {
         assert!(simulation.add_body(body).is_err());
     }
@@ -207,27 +189,19 @@ fn materials_of_a_body_share_a_stretch_as_springs_in_series() {
         .young_modulus(1e5)
         .poisson_ratio(0.0)
         .damping(0.05)
-        .material(MaterialSpec {
-            regions: vec![Region::HalfSpace {
-                point: [0.0; 3],
-                normal: [1.0, 0.0, 0.0],
-            }],
-            young_modulus: Some(1e6),
-            density: Some(3000.0),
-            ..MaterialSpec::default()
-        });
+        .material(MaterialSpec::default().with(|spec| {
+            spec.regions = vec![Region::half_space([0.0; 3], [1.0, 0.0, 0.0])];
+            spec.young_modulus = Some(1e6);
+            spec.density = Some(3000.0);
+        }));
     let mut builder = Simulation::builder();
     builder.add_body(body);
-    let end = |sign: f64| Region::HalfSpace {
-        point: [0.499 * sign, 0.0, 0.0],
-        normal: [sign, 0.0, 0.0],
-    };
+    let end = |sign: f64| Region::half_space([0.499 * sign, 0.0, 0.0], [sign, 0.0, 0.0]);
     builder.add_attachment(AttachmentSpec::new(0, vec![end(-1.0)]));
-    builder.add_attachment(AttachmentSpec {
-        frames: [0, 30],
-        path: vec![[0.0; 3], [0.02, 0.0, 0.0]],
-        ..AttachmentSpec::new(0, vec![end(1.0)])
-    });
+    builder.add_attachment(AttachmentSpec::new(0, vec![end(1.0)]).with(|spec| {
+        spec.frames = [0, 30];
+        spec.path = vec![[0.0; 3], [0.02, 0.0, 0.0]];
+    }));
     let mut simulation = builder.build().unwrap();
     for _ in 0..120 {
         simulation.step().unwrap();
@@ -257,12 +231,7 @@ fn materials_of_a_body_share_a_stretch_as_springs_in_series() {
     let whole = mass(&simulation);
     assert!((whole / (2000.0 * volume) - 1.0).abs() < 0.05, "{whole}");
     simulation
-        .cut(StrokeSpec::Plane {
-            frame: 0,
-            point: [0.0; 3],
-            normal: [0.3, 1.0, 0.0],
-            snap: 0.1,
-        })
+        .cut(StrokeSpec::plane(0, [0.0; 3], [0.3, 1.0, 0.0]))
         .unwrap();
     simulation.step().unwrap();
     let detached: f64 = simulation.report().detached.iter().map(|d| d.mass).sum();
@@ -277,10 +246,7 @@ fn materials_of_a_body_share_a_stretch_as_springs_in_series() {
 #[test]
 fn parts_are_regions_or_lists_of_tets() {
     let mesh = generate(Shape::Box, 300).unwrap();
-    let upper = Region::HalfSpace {
-        point: [0.0, 0.0, 0.1],
-        normal: [0.0, 0.0, 1.0],
-    };
+    let upper = Region::half_space([0.0, 0.0, 0.1], [0.0, 0.0, 1.0]);
     let centers = mesh.tets.iter().map(|tet| {
         let corners = tet.map(|p| mesh.positions[p.index()]);
         corners.iter().sum::<DVec3>() / 4.0
@@ -290,10 +256,11 @@ fn parts_are_regions_or_lists_of_tets() {
         .filter(|(_, x)| x.z >= 0.1)
         .map(|(t, _)| t)
         .collect();
-    let part = |regions, young_modulus| MaterialSpec {
-        regions,
-        young_modulus: Some(young_modulus),
-        ..MaterialSpec::default()
+    let part = |regions, young_modulus| {
+        MaterialSpec::default().with(|spec| {
+            spec.regions = regions;
+            spec.young_modulus = Some(young_modulus);
+        })
     };
     let run = |parts: Vec<MaterialSpec>| {
         let mut builder = solved(Precision::F64);
@@ -328,12 +295,10 @@ fn colliders_move_on_without_the_first_body() {
     let mut builder = solved(Precision::F64);
     let first = builder.add_body(ball(0.0));
     builder.add_body(slab(3.0));
-    let plate = builder.add_collider(incise::scene::ColliderSpec::Plane {
-        point: [0.0, 0.0, 5.0],
-        normal: [0.0, 0.0, -1.0],
-        friction: 0.0,
-        velocity: [0.0, 0.0, -1.0],
-    });
+    let plate = builder.add_collider(
+        incise::scene::ColliderSpec::plane([0.0, 0.0, 5.0], [0.0, 0.0, -1.0])
+            .with_velocity([0.0, 0.0, -1.0]),
+    );
     let mut simulation = builder.build().unwrap();
     simulation.step().unwrap();
     simulation.remove_body(first).unwrap();

@@ -53,10 +53,7 @@ fn each_method_has_its_defaults_and_named_keys_override_them() {
         let given = spec("iterations = 1\nrelaxation = 1.0\nsubsteps = \"auto\"");
         assert_eq!(
             given,
-            SolverSpec {
-                method,
-                ..SolverSpec::default()
-            }
+            SolverSpec::default().with(|spec| spec.method = method)
         );
         let scene = falling(&format!("method = \"{name}\"\nrelaxation = 0.3"));
         assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
@@ -319,13 +316,15 @@ fn memory_of_two_level_vbd_follows_the_tets_through_many_cuts() {
     for number in 0..20 {
         let at = |k: usize, size: f64| size * noise(5, 9 * number + k);
         simulation
-            .cut(StrokeSpec::Rectangle {
-                frame: 0,
-                center: [at(0, 0.5), at(1, 0.12), at(2, 0.12)],
-                half_u: [at(3, 0.2), at(4, 0.2), 0.2],
-                half_v: [at(6, 0.2), 0.2, at(8, 0.2)],
-                snap: 0.0,
-            })
+            .cut(
+                StrokeSpec::rectangle(
+                    0,
+                    [at(0, 0.5), at(1, 0.12), at(2, 0.12)],
+                    [at(3, 0.2), at(4, 0.2), 0.2],
+                    [at(6, 0.2), 0.2, at(8, 0.2)],
+                )
+                .with_snap(0.0),
+            )
             .unwrap();
         // The factor ages.
         for _ in 0..4 {

@@ -11,16 +11,10 @@ type Mistake = (&'static str, fn(&mut Scene));
 const MISTAKES: [Mistake; 28] = [
     ("solver.substeps", |s| s.solver.substeps = 0.into()),
     ("solver.sleep.speed", |s| {
-        s.solver.sleep = Some(SleepSpec {
-            speed: f64::NAN,
-            time: 1.0,
-        });
+        s.solver.sleep = Some(SleepSpec::new(f64::NAN, 1.0));
     }),
     ("solver.sleep.time", |s| {
-        s.solver.sleep = Some(SleepSpec {
-            speed: 1.0,
-            time: 0.0,
-        });
+        s.solver.sleep = Some(SleepSpec::new(1.0, 0.0));
     }),
     ("solver.max_substeps", |s| s.solver.max_substeps = 0),
     ("body[0].substeps", |s| s.body[0].substeps = Some(0.into())),

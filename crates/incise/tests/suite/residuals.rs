@@ -75,10 +75,7 @@ fn sleeping_bodies_have_no_residuals() {
     scene.report.every = 1;
     scene.world.gravity = None;
     scene.stroke.clear();
-    scene.solver.sleep = Some(SleepSpec {
-        speed: 10.0,
-        time: 0.02,
-    });
+    scene.solver.sleep = Some(SleepSpec::new(10.0, 0.02));
     let mut simulation = simulation(&scene);
     (0..3).for_each(|_| assert!(simulation.step().is_ok()));
     assert!(simulation.report().residual.is_none(), "a body is awake");
@@ -99,17 +96,11 @@ fn residuals_are_dropped_with_outdated_settings() {
     assert!(simulation.residuals_of_tets().is_none());
     simulation.restore(&snapshot).unwrap();
     assert!(then.is_some() && simulation.residuals_of_tets() == then);
-    let iterations = SolverSpec {
-        iterations: 2,
-        ..SolverSpec::default()
-    };
+    let iterations = SolverSpec::default().with(|spec| spec.iterations = 2);
     simulation.set_solver(&iterations).unwrap();
     assert!(simulation.residuals_of_tets().is_none());
     simulation.set_solver(&SolverSpec::of(Method::Vbd)).unwrap();
-    let always = ReportSpec {
-        every: 1,
-        quantities: vec![Quantity::Residual],
-    };
+    let always = ReportSpec::default().with(|spec| spec.quantities = vec![Quantity::Residual]);
     simulation.set_report(always).unwrap();
     assert!(simulation.step().unwrap().residual.is_some());
     assert!(simulation.residuals_of_tets().is_none(), "vbd has none");

@@ -10,10 +10,7 @@ use crate::support::{body, scene, simulation};
 
 /// The defaults with a number of substeps: a chosen one may rise with cuts, and later settings then start from that.
 fn five() -> SolverSpec {
-    SolverSpec {
-        substeps: 5.into(),
-        ..SolverSpec::default()
-    }
+    SolverSpec::default().with(|spec| spec.substeps = 5.into())
 }
 
 #[test]
@@ -42,10 +39,7 @@ fn at_the_start_it_is_as_if_set_up_so() {
             .map(|(_, solver)| three(&mut simulation(&with(&base, solver))))
             .collect();
         for start in &starts {
-            let start = SolverSpec {
-                precision,
-                ..start.clone()
-            };
+            let start = start.clone().with(|spec| spec.precision = precision);
             let mut simulation = simulation(&with(&base, &start));
             // Making its meshes takes longer than all else.
             let snapshot = simulation.snapshot().unwrap();
@@ -138,10 +132,7 @@ fn obstacles_go_on_from_where_they_are() {
     )));
     let mut floor = -0.55;
     for time_step in [0.016, 0.008, 0.016] {
-        let solver = SolverSpec {
-            time_step,
-            ..five()
-        };
+        let solver = five().with(|spec| spec.time_step = time_step);
         simulation.set_solver(&solver).unwrap();
         for _ in 0..20 {
             simulation.step().unwrap();
@@ -162,10 +153,11 @@ fn softened_tets_of_a_cut_body_are_restored() {
     base.world = incise::scene::WorldSpec::default();
     base.collider.clear();
     base.attachment.clear();
-    let limits = |kappa_limit, substeps: u32| SolverSpec {
-        kappa_limit,
-        substeps: substeps.into(),
-        ..five()
+    let limits = |kappa_limit, substeps: u32| {
+        five().with(|spec| {
+            spec.kappa_limit = kappa_limit;
+            spec.substeps = substeps.into();
+        })
     };
     // Nothing moves but by the cut, which is the same: so are the meshes.
     let [mut here, mut there] =
@@ -226,11 +218,12 @@ fn detours_leave_no_trace() {
 fn auto_chooses_from_the_body_as_it_is() {
     let mut simulation = simulation(&two_bodies());
     (0..5).for_each(|_| assert!(simulation.step().is_ok()));
-    let auto = |max_substeps| SolverSpec {
-        method: Method::GaussSeidel,
-        substeps: Substeps::Auto,
-        max_substeps,
-        ..five()
+    let auto = |max_substeps| {
+        five().with(|spec| {
+            spec.method = Method::GaussSeidel;
+            spec.substeps = Substeps::Auto;
+            spec.max_substeps = max_substeps;
+        })
     };
     simulation.set_solver(&auto(200)).unwrap();
     let chosen = |simulation: &mut Simulation| {
@@ -248,10 +241,7 @@ fn auto_chooses_from_the_body_as_it_is() {
     );
     // Iterations have nothing to do with it.
     simulation
-        .set_solver(&SolverSpec {
-            iterations: 2,
-            ..auto(200)
-        })
+        .set_solver(&auto(200).with(|spec| spec.iterations = 2))
         .unwrap();
     assert_eq!(chosen(&mut simulation), first);
     simulation.set_solver(&auto(2)).unwrap();
@@ -267,10 +257,7 @@ fn auto_chooses_from_the_body_as_it_is() {
 /// Sleeping bodies would not show other settings.
 #[test]
 fn sleeping_bodies_wake_after_changed_settings() {
-    let sleep = Some(SleepSpec {
-        speed: 10.0,
-        time: 0.03,
-    });
+    let sleep = Some(SleepSpec::new(10.0, 0.03));
     let mut scene = scene(&body("sphere", 200, [0.0, 0.0, 0.0]));
     scene.solver.sleep = sleep;
     let mut simulation = simulation(&scene);
@@ -282,10 +269,7 @@ fn sleeping_bodies_wake_after_changed_settings() {
     );
     simulation.set_solver(&scene.solver.clone()).unwrap();
     assert!(asleep(&mut simulation), "nothing differs");
-    let more = SolverSpec {
-        iterations: 2,
-        ..scene.solver.clone()
-    };
+    let more = scene.solver.clone().with(|spec| spec.iterations = 2);
     simulation.set_solver(&more).unwrap();
     assert_eq!([(); 2].map(|()| asleep(&mut simulation)), [false, true]);
 }
@@ -294,12 +278,13 @@ fn sleeping_bodies_wake_after_changed_settings() {
 fn worn_clusters_are_renewed_once_that_is_asked_for() {
     let mut simulation = simulation(&two_bodies());
     (0..5).for_each(|_| assert!(simulation.step().is_ok()));
-    let recluster = |threshold| SolverSpec {
-        recluster: Some(ReclusterSpec {
-            threshold,
-            frames: std::num::NonZeroU32::MIN,
-        }),
-        ..five()
+    let recluster = |threshold| {
+        five().with(|spec| {
+            spec.recluster = Some(ReclusterSpec::default().with(|recluster| {
+                recluster.threshold = threshold;
+                recluster.frames = std::num::NonZeroU32::MIN;
+            }));
+        })
     };
     simulation.set_solver(&recluster(1.01)).unwrap();
     assert_eq!(simulation.step().unwrap().reclustered, 0);
@@ -326,83 +311,35 @@ fn refused_settings_change_nothing() {
     let plain = five;
     let refused: [(SolverSpec, &str); 11] = [
         (
-            SolverSpec {
-                precision: Precision::F64,
-                ..plain()
-            },
+            plain().with(|spec| spec.precision = Precision::F64),
             "solver.precision",
         ),
+        (plain().with(|spec| spec.time_step = f64::NAN), "time_step"),
+        (plain().with(|spec| spec.substeps = 0.into()), "substeps"),
         (
-            SolverSpec {
-                time_step: f64::NAN,
-                ..plain()
-            },
-            "time_step",
-        ),
-        (
-            SolverSpec {
-                substeps: 0.into(),
-                ..plain()
-            },
-            "substeps",
-        ),
-        (
-            SolverSpec {
-                max_substeps: 0,
-                ..plain()
-            },
+            plain().with(|spec| spec.max_substeps = 0),
             "solver.max_substeps",
         ),
+        (plain().with(|spec| spec.iterations = 0), "iterations"),
+        (plain().with(|spec| spec.relaxation = 3.0), "relaxation"),
         (
-            SolverSpec {
-                iterations: 0,
-                ..plain()
-            },
-            "iterations",
-        ),
-        (
-            SolverSpec {
-                relaxation: 3.0,
-                ..plain()
-            },
-            "relaxation",
-        ),
-        (
-            SolverSpec {
-                kappa_limit: -1.0,
-                ..plain()
-            },
+            plain().with(|spec| spec.kappa_limit = -1.0),
             "solver.kappa_limit",
         ),
         (
-            SolverSpec {
-                clustering: "round:3".into(),
-                ..plain()
-            },
+            plain().with(|spec| spec.clustering = "round:3".into()),
             "solver.clustering",
         ),
         (
-            SolverSpec {
-                coloring: "pink".into(),
-                ..plain()
-            },
+            plain().with(|spec| spec.coloring = "pink".into()),
             "solver.coloring",
         ),
         (
-            SolverSpec {
-                two_level: true,
-                ..plain()
-            },
+            plain().with(|spec| spec.two_level = true),
             "solver.two_level",
         ),
         (
-            SolverSpec {
-                sleep: Some(SleepSpec {
-                    speed: -1.0,
-                    time: 1.0,
-                }),
-                ..plain()
-            },
+            plain().with(|spec| spec.sleep = Some(SleepSpec::new(-1.0, 1.0))),
             "solver.sleep",
         ),
     ];
@@ -424,7 +361,7 @@ fn a_device_is_refused_where_there_is_no_path_to_one() {
     use incise::Error;
     use incise::scene::Backend;
     let mut simulation = simulation(&two_bodies());
-    let on = |backend| SolverSpec { backend, ..five() };
+    let on = |backend| five().with(|spec| spec.backend = backend);
     let error = simulation.set_solver(&on(Backend::Gpu)).unwrap_err();
     assert!(matches!(error, Error::NoGpuPath), "{error}");
     assert!(simulation.backend_note().is_none());

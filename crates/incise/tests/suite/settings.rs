@@ -28,106 +28,65 @@ pub(crate) fn two_bodies() -> Scene {
 /// Settings that differ from those of [`two_bodies`], each in something else, by name. The number of substeps is given:
 /// a chosen one may rise with cuts, and later settings would start from that.
 pub(crate) fn settings() -> Vec<(&'static str, SolverSpec)> {
-    let of = |method| SolverSpec {
-        substeps: 5.into(),
-        ..SolverSpec::of(method)
-    };
+    let of = |method| SolverSpec::of(method).with(|spec| spec.substeps = 5.into());
     let plain = || of(Method::GaussSeidel);
     vec![
         ("nothing", plain()),
         (
             "iterations",
-            SolverSpec {
-                iterations: 3,
-                relaxation: 0.9,
-                tet_solve: TetSolve::Sequential,
-                ..plain()
-            },
+            plain().with(|spec| {
+                spec.iterations = 3;
+                spec.relaxation = 0.9;
+                spec.tet_solve = TetSolve::Sequential;
+            }),
         ),
         ("jacobi", of(Method::Jacobi)),
         ("chebyshev", of(Method::Chebyshev)),
         ("vbd", of(Method::Vbd)),
         (
             "vbd with a limit",
-            SolverSpec {
-                kappa_limit: 0.02,
-                ..of(Method::Vbd)
-            },
+            of(Method::Vbd).with(|spec| spec.kappa_limit = 0.02),
         ),
         (
             "corrected vbd with a limit",
-            SolverSpec {
-                substeps: 1.into(),
-                iterations: 3,
-                two_level: true,
-                kappa_limit: 0.05,
-                ..of(Method::Vbd)
-            },
+            of(Method::Vbd).with(|spec| {
+                spec.substeps = 1.into();
+                spec.iterations = 3;
+                spec.two_level = true;
+                spec.kappa_limit = 0.05;
+            }),
         ),
-        (
-            "substeps",
-            SolverSpec {
-                substeps: 2.into(),
-                ..plain()
-            },
-        ),
+        ("substeps", plain().with(|spec| spec.substeps = 2.into())),
         (
             "auto",
-            SolverSpec {
-                substeps: Substeps::Auto,
-                max_substeps: 7,
-                ..plain()
-            },
+            plain().with(|spec| {
+                spec.substeps = Substeps::Auto;
+                spec.max_substeps = 7;
+            }),
         ),
-        (
-            "time step",
-            SolverSpec {
-                time_step: 0.008,
-                ..plain()
-            },
-        ),
-        (
-            "low limit",
-            SolverSpec {
-                kappa_limit: 0.02,
-                ..plain()
-            },
-        ),
-        (
-            "high limit",
-            SolverSpec {
-                kappa_limit: 1.0,
-                ..plain()
-            },
-        ),
+        ("time step", plain().with(|spec| spec.time_step = 0.008)),
+        ("low limit", plain().with(|spec| spec.kappa_limit = 0.02)),
+        ("high limit", plain().with(|spec| spec.kappa_limit = 1.0)),
         (
             "clusters",
-            SolverSpec {
-                clustering: "none".into(),
-                coloring: "scgc".into(),
-                ..plain()
-            },
+            plain().with(|spec| {
+                spec.clustering = "none".into();
+                spec.coloring = "scgc".into();
+            }),
         ),
         (
             "degradation",
-            SolverSpec {
-                merge_clusters: false,
-                recluster: Some(ReclusterSpec {
-                    threshold: 1.01,
-                    frames: std::num::NonZeroU32::MIN.saturating_add(1),
-                }),
-                ..plain()
-            },
+            plain().with(|spec| {
+                spec.merge_clusters = false;
+                spec.recluster = Some(ReclusterSpec::default().with(|recluster| {
+                    recluster.threshold = 1.01;
+                    recluster.frames = std::num::NonZeroU32::MIN.saturating_add(1);
+                }));
+            }),
         ),
         (
             "sleep",
-            SolverSpec {
-                sleep: Some(SleepSpec {
-                    speed: 1.0,
-                    time: 0.02,
-                }),
-                ..plain()
-            },
+            plain().with(|spec| spec.sleep = Some(SleepSpec::new(1.0, 0.02))),
         ),
     ]
 }

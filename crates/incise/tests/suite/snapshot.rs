@@ -40,12 +40,7 @@ fn go_on(simulation: &mut Simulation, frames: u32) -> Vec<Vec<u64>> {
 
 /// A plane through the middle, at once.
 pub(crate) fn halving(at: f64) -> StrokeSpec {
-    StrokeSpec::Plane {
-        frame: 0,
-        point: [at, 0.0, 0.0],
-        normal: [1.0, 0.2, 0.1],
-        snap: 0.1,
-    }
+    StrokeSpec::plane(0, [at, 0.0, 0.0], [1.0, 0.2, 0.1])
 }
 
 /// Takes a snapshot at a frame and continues; restores it in this and in another simulation of the scene, makes a new
@@ -208,10 +203,10 @@ fn a_snapshot_of_another_simulation_is_continued() {
 fn reports_change_from_the_next_frame_on() {
     let mut simulation = simulation(&scene(&body("sphere", 300, [0.0, 0.0, 0.0])));
     assert!(simulation.step().unwrap().energy.is_none());
-    let report = ReportSpec {
-        every: 2,
-        quantities: vec![Quantity::Energy],
-    };
+    let report = ReportSpec::default().with(|spec| {
+        spec.every = 2;
+        spec.quantities = vec![Quantity::Energy];
+    });
     simulation.set_report(report.clone()).unwrap();
     let reported = |simulation: &mut Simulation| simulation.step().unwrap().energy.is_some();
     // Frames are counted from the first.
@@ -224,7 +219,7 @@ fn reports_change_from_the_next_frame_on() {
     assert!(!reported(&mut simulation));
     simulation.restore(&snapshot).unwrap();
     assert!(reported(&mut simulation));
-    let none = ReportSpec { every: 0, ..report };
+    let none = report.with(|spec| spec.every = 0);
     let error = simulation.set_report(none).unwrap_err();
     assert!(error.to_string().contains("report.every"), "{error}");
     assert!(!reported(&mut simulation));
@@ -316,11 +311,10 @@ fn grabs_continue_from_a_snapshot() {
             "the blade goes on, too"
         );
         // Other settings leave hands as they are.
-        let spec = SolverSpec {
-            substeps: Substeps::Fixed(9),
-            clustering: "serial:5".to_owned(),
-            ..simulation.solver_spec().clone()
-        };
+        let spec = simulation.solver_spec().clone().with(|spec| {
+            spec.substeps = Substeps::Fixed(9);
+            spec.clustering = "serial:5".to_owned();
+        });
         simulation.set_solver(&spec).unwrap();
         work(&mut simulation, 12..14);
         simulation.end_stroke(stroke).unwrap();

@@ -13,12 +13,7 @@ use incise::{Body, Error, Simulation, SimulationBuilder};
 
 use crate::support::{scene, state};
 
-const SOLID: SolidBladeSpec = SolidBladeSpec {
-    thickness: 0.004,
-    wedge_angle_degrees: 10.0,
-    height: 0.05,
-    friction: 0.0,
-};
+const SOLID: SolidBladeSpec = SolidBladeSpec::new(0.004, 10.0, 0.05);
 
 /// A loaf that is held at its far end, and is cut along its middle.
 fn loaf(solver: SolverSpec) -> SimulationBuilder {
@@ -37,21 +32,20 @@ fn loaf_of(solver: SolverSpec, is_mirrored: bool) -> SimulationBuilder {
     }
     let body = Body::new(mesh).young_modulus(2e4).damping(0.02);
     let mut builder = Simulation::builder();
-    builder.solver(solver).threads(1).report(ReportSpec {
-        every: 1,
-        quantities: vec![Quantity::Force],
-    });
+    builder
+        .solver(solver)
+        .threads(1)
+        .report(ReportSpec::default().with(|spec| spec.quantities = vec![Quantity::Force]));
     builder.add_body(body.pinned(|x| x.x > 0.199));
     builder
 }
 
 fn gauss_seidel(precision: Precision) -> SolverSpec {
-    SolverSpec {
-        precision,
-        substeps: 12.into(),
-        method: Method::GaussSeidel,
-        ..SolverSpec::default()
-    }
+    SolverSpec::default().with(|spec| {
+        spec.precision = precision;
+        spec.substeps = 12.into();
+        spec.method = Method::GaussSeidel;
+    })
 }
 
 /// The edge across the loaf, a little off the layers of its mesh.
@@ -150,7 +144,7 @@ fn the_sides_are_the_thickness_apart_at_the_blade() {
 fn the_blade_feels_what_it_pushes() {
     let mut pushes = Vec::new();
     for friction in [0.0, 0.4] {
-        let solid = SolidBladeSpec { friction, ..SOLID };
+        let solid = SOLID.with(|spec| spec.friction = friction);
         let mut simulation = loaf(gauss_seidel(Precision::F64)).build().unwrap();
         let body = simulation.bodies()[0];
         let stroke = bring_in(&mut simulation, &solid, 25);
@@ -242,13 +236,12 @@ fn a_blade_that_is_drawn_back_lets_go() {
 /// A sweep of a scene with a body is, to the bit, the same strokes made live, on any number of threads.
 #[test]
 fn a_scene_says_what_a_program_does() {
-    let stroke = StrokeSpec::Sweep {
-        frames: [0, 25],
-        blade: edge(-0.01).map(|x| x.to_array()).to_vec(),
-        path: vec![[0.0; 3], [0.1, 0.0, 0.0]],
-        snap: 0.1,
-        solid: Some(SOLID),
-    };
+    let stroke = StrokeSpec::solid_sweep(
+        [0, 25],
+        edge(-0.01).map(|x| x.to_array()).to_vec(),
+        vec![[0.0; 3], [0.1, 0.0, 0.0]],
+        SOLID,
+    );
     let mut of_scene = loaf(gauss_seidel(Precision::F32));
     of_scene.add_stroke(stroke.clone()).threads(3);
     let mut of_scene = of_scene.build().unwrap();

@@ -12,10 +12,7 @@ use crate::support::state;
 /// The solvers that tests run with: XPBD in both precisions, VBD with and without correction.
 fn solvers() -> Vec<SolverSpec> {
     let with = |change: fn(&mut SolverSpec)| {
-        let mut spec = SolverSpec {
-            method: Method::GaussSeidel,
-            ..SolverSpec::default()
-        };
+        let mut spec = SolverSpec::default().with(|spec| spec.method = Method::GaussSeidel);
         change(&mut spec);
         spec
     };
@@ -39,10 +36,7 @@ fn beam(solver: &SolverSpec) -> SimulationBuilder {
 }
 
 fn end(sign: f64) -> Region {
-    Region::HalfSpace {
-        point: [0.45 * sign, 0.0, 0.0],
-        normal: [sign, 0.0, 0.0],
-    }
+    Region::half_space([0.45 * sign, 0.0, 0.0], [sign, 0.0, 0.0])
 }
 
 /// The particles of one end of the beam at rest.
@@ -54,14 +48,11 @@ fn of_end(simulation: &Simulation, sign: f64) -> Vec<usize> {
 }
 
 fn thread(to: [f64; 3], length: f64) -> DistanceSpec {
-    let point = |point| EndSpec { body: 0, point };
-    DistanceSpec {
-        from: point([-0.5, 0.0, 0.0]),
-        to: point(to),
-        length: Some(length),
-        compliance: 0.0,
-        tension_only: true,
-    }
+    let point = |point| EndSpec::new(0, point);
+    DistanceSpec::new(point([-0.5, 0.0, 0.0]), point(to)).with(|spec| {
+        spec.length = Some(length);
+        spec.tension_only = true;
+    })
 }
 
 /// What is declared and what is added before the first frame is the same simulation, to the bit. (VBD colors particles by
@@ -106,11 +97,10 @@ fn an_attachment_is_moved_made_soft_and_removed() {
     for solver in solvers() {
         let mut builder = beam(&solver);
         builder.add_attachment(AttachmentSpec::new(0, vec![end(-1.0)]));
-        let grip = builder.add_attachment(AttachmentSpec {
-            frames: [0, 100],
-            path: vec![[0.0; 3], [0.0, 0.0, 5.0]],
-            ..AttachmentSpec::new(0, vec![end(1.0)])
-        });
+        let grip = builder.add_attachment(AttachmentSpec::new(0, vec![end(1.0)]).with(|spec| {
+            spec.frames = [0, 100];
+            spec.path = vec![[0.0; 3], [0.0, 0.0, 5.0]];
+        }));
         let mut simulation = builder.build().unwrap();
         let held = of_end(&simulation, 1.0);
         let rest: Vec<DVec3> = held
@@ -170,12 +160,7 @@ fn a_suture_is_pulled_tight_and_cut() {
     for solver in solvers() {
         let mut simulation = beam(&solver).build().unwrap();
         simulation
-            .cut(StrokeSpec::Plane {
-                frame: 0,
-                point: [0.01, 0.0, 0.0],
-                normal: [1.0, 0.0, 0.0],
-                snap: 0.1,
-            })
+            .cut(StrokeSpec::plane(0, [0.01, 0.0, 0.0], [1.0, 0.0, 0.0]))
             .unwrap();
         assert_eq!(simulation.step().unwrap().pieces, 2);
         let tie = simulation
@@ -227,10 +212,7 @@ fn bad_ties_are_refused_and_nothing_changes() {
     simulation.step().unwrap();
     let before = state(&simulation);
     let whole = AttachmentSpec::new(0, vec![end(-1.0), end(1.0)]);
-    let soft = AttachmentSpec {
-        compliance: f64::NAN,
-        ..AttachmentSpec::new(0, vec![end(-1.0)])
-    };
+    let soft = AttachmentSpec::new(0, vec![end(-1.0)]).with(|spec| spec.compliance = f64::NAN);
     let missing = AttachmentSpec::new(2, vec![end(1.0)]);
     let message = |result: Result<_, incise::Error>| match result {
         Ok(_) => panic!("it was taken"),

@@ -68,6 +68,7 @@ pub(crate) fn sweep(scene: &mut Scene) -> SweepParts<'_> {
             path,
             snap,
             solid: None,
+            ..
         } => (frames, blade, path, snap),
         _ => panic!("the second stroke is a sweep"),
     }
@@ -79,9 +80,9 @@ pub(crate) fn region(scene: &mut Scene, vector: usize) -> &mut f64 {
     };
     match (half_space, low_high, sphere) {
         (
-            Region::HalfSpace { point, normal },
-            Region::Box { low, high },
-            Region::Sphere { center, radius },
+            Region::HalfSpace { point, normal, .. },
+            Region::Box { low, high, .. },
+            Region::Sphere { center, radius, .. },
         ) => match vector {
             0 => &mut point[1],
             1 => &mut normal[2],

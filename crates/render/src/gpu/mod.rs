@@ -49,7 +49,7 @@ const WIDEST: u32 = 65_535;
 ///     other => Arc::new(other?),
 /// };
 /// let mut scene = Scene::built_in();
-/// scene.body[0].shape = Some(ShapeSpec { kind: "liver".into(), tets: 500 });
+/// scene.body[0].shape = Some(ShapeSpec::new("liver", 500));
 /// let simulation = Simulation::new(&scene)?;
 /// let render_scene = RenderScene::new(&simulation, &scene);
 /// let [low, high] = render_scene.bounds(&simulation);

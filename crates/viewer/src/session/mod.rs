@@ -116,10 +116,10 @@ impl Session {
     pub(crate) fn measure(&mut self, on: bool) -> anyhow::Result<()> {
         let mut report = ReportSpec::default();
         if on {
-            report = ReportSpec {
-                every: EVERY,
-                quantities: vec![Quantity::Residual, Quantity::Volume],
-            };
+            report = ReportSpec::default().with(|spec| {
+                spec.every = EVERY;
+                spec.quantities = vec![Quantity::Residual, Quantity::Volume];
+            });
         }
         self.simulation.set_report(report)?;
         (self.measures, self.measured) = (on, None);

@@ -190,12 +190,11 @@ fn settings_change_on_a_cut_body() {
         to: to.to_owned(),
         spec,
     };
-    let spec = SolverSpec {
-        substeps: Substeps::Fixed(9),
-        iterations: 3,
-        clustering: "serial:4".to_owned(),
-        ..session.solver().clone()
-    };
+    let spec = session.solver().clone().with(|spec| {
+        spec.substeps = Substeps::Fixed(9);
+        spec.iterations = 3;
+        spec.clustering = "serial:4".to_owned();
+    });
     let this = change("there", spec.clone());
     session.change_setting(&this).unwrap();
     session.step().unwrap();
@@ -206,10 +205,7 @@ fn settings_change_on_a_cut_body() {
     );
     assert_eq!(session.report().pieces, 2);
     // An invalid setting keeps its value.
-    let impossible = SolverSpec {
-        relaxation: -1.0,
-        ..SolverSpec::of(Method::Jacobi)
-    };
+    let impossible = SolverSpec::of(Method::Jacobi).with(|spec| spec.relaxation = -1.0);
     let this = change("nowhere", impossible);
     let refused = format!("{:#}", session.change_setting(&this).unwrap_err());
     assert!(
