@@ -1,10 +1,12 @@
 //! `cargo xtask stress-cut`: thousands of random strokes, with all derived data checked after each.
 //!
 //! The body sags under its weight, fixed on one side, with a ground for falling pieces. Each stroke is of a random kind
-//! and place, a few edges large: rectangles, bent strips, punches, blades swept over several frames, repeats of the
-//! previous stroke, sometimes a removal of tets. After every frame with a stroke all derived data is recomputed and
-//! compared (`Simulation::check`), positions must be finite, and the deltas must agree with the mesh. Cutting only adds
-//! tets, so a body that has tripled is replaced by a new one. The seed determines everything.
+//! and place, a few edges large: rectangles, bent strips, punches, blades swept over several frames, in overlapping rows or
+//! across their own path, repeats of the previous stroke, at its place or beside it by less than an edge (thin slices),
+//! sometimes a removal of tets. Up to three frames without a blade follow, in which the mesh is improved. After every frame
+//! all derived data is recomputed and compared (`Simulation::check`, volume to 1e-12), positions must be finite, and the
+//! deltas must agree with the mesh. A body that has tripled its tets is replaced by a new one. The seed determines
+//! everything.
 //!
 //! With `--contact` parts and sides of cuts touch. Energy is measured then: kinetic, elastic and gravity together must not
 //! grow in a frame by more than a part in a thousand of the energy that the body has when it falls by its own size. Frames
@@ -50,6 +52,9 @@ pub(crate) struct StressArguments {
     /// Measure energy without contact, too.
     #[arg(long)]
     energy: bool,
+    /// Without improvement after strokes.
+    #[arg(long)]
+    plain: bool,
 }
 
 /// Largest growth of the energy in a frame, as a part of weight times size of the body.
@@ -63,6 +68,8 @@ struct Tally {
     bodies: u64,
     tets_cut: usize,
     tets_created: usize,
+    /// Particles that improvements took out.
+    collapsed: usize,
     detached: usize,
     most_pieces: usize,
     least_dihedral: f64,
@@ -100,6 +107,7 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
         "bodies used up",
         "tets cut",
         "tets each became",
+        "particles taken out",
         "pieces detached",
         "most pieces",
         "most colors",
@@ -134,6 +142,7 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
                 "{:.2}",
                 tally.tets_created as f64 / tally.tets_cut.max(1) as f64
             ),
+            tally.collapsed.to_string(),
             tally.detached.to_string(),
             tally.most_pieces.to_string(),
             tally.most_colors.to_string(),
@@ -171,7 +180,7 @@ fn stress_one(
     };
     while tally.strokes < arguments.strokes && !late() {
         tally.bodies += 1;
-        let mut scene = scene(model, &mut random);
+        let mut scene = scene(model, arguments.plain, &mut random);
         if arguments.contact {
             scene.contact = Some(ContactSpec::default());
         }
@@ -188,6 +197,7 @@ fn stress_one(
         while tally.strokes < arguments.strokes && simulation.mesh().tets.len() < limit && !late() {
             let stroke = match last.take() {
                 Some(stroke) if random.below(8) == 0 => stroke,
+                Some(stroke) if random.below(6) == 0 => beside(stroke, &simulation, &mut random),
                 _ => random_stroke(&simulation, &mut random),
             };
             let frame = simulation.report().frame + 1;
@@ -195,7 +205,7 @@ fn stress_one(
             let frames = stroke.last_frame() - stroke.first_frame() + 1;
             simulation.cut(stroke.clone())?;
             tally.strokes += 1;
-            for _ in 0..frames {
+            for _ in 0..frames + random.below(4) as u64 {
                 let step = checked_step(&mut simulation, &mut skin, &mut tally);
                 energy.note(&simulation, &mut tally);
                 step.with_context(|| {
@@ -240,6 +250,7 @@ fn checked_step(
         tally.cut += 1;
         tally.tets_cut += cut.tets_cut;
         tally.tets_created += cut.tets_created;
+        tally.collapsed += cut.collapsed;
         tally.least_ratio = tally.least_ratio.min(cut.worst_volume_ratio);
         let least = cut.dihedral.map_or(f64::INFINITY, |[least, _]| least);
         tally.least_dihedral = tally.least_dihedral.min(least);
@@ -299,8 +310,9 @@ impl Energy {
 }
 
 /// The built-in scene without its stroke, with a ground below.
-fn scene(model: &Model, random: &mut Random) -> Scene {
+fn scene(model: &Model, plain: bool, random: &mut Random) -> Scene {
     let mut scene = Scene::built_in();
+    scene.cutting.improve = !plain;
     scene.stroke.clear();
     model.put_into(&mut scene.body[0]);
     let body: &mut BodySpec = &mut scene.body[0];
@@ -327,7 +339,7 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
     let u = u * size;
     let array = DVec3::to_array;
     let (frame, snap) = (0, [0.0, 0.05, 0.1, 0.1, 0.1, 0.2][random.below(6)]);
-    match random.below(10) {
+    match random.below(12) {
         0..=3 => StrokeSpec::rectangle(frame, array(&center), array(&u), array(&v)).with_snap(snap),
         4 | 5 => {
             // A strip of two bays, bent at the middle.
@@ -347,6 +359,34 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
         7 if random.below(8) == 0 => {
             StrokeSpec::remove(frame, Region::sphere(array(&center), 0.5 * size))
         }
+        10 => {
+            // Rows that overlap, to and fro.
+            let across = |row: i32| 0.4 * f64::from(row) * u;
+            let rows = (-2..=2).flat_map(|row| {
+                let sign = if row % 2 == 0 { 1.0 } else { -1.0 };
+                [
+                    array(&(across(row) - sign * v)),
+                    array(&(across(row) + sign * v)),
+                ]
+            });
+            StrokeSpec::sweep(
+                [0, 10 + random.below(10) as u64],
+                vec![array(&(center - 0.35 * u)), array(&(center + 0.35 * u))],
+                rows.collect(),
+            )
+            .with_snap(snap)
+        }
+        11 => {
+            // A loop across its own path.
+            let n = normal * size * 0.4;
+            let path = [-v - n, v + n, v - n, -v + n, -v - n];
+            StrokeSpec::sweep(
+                [0, 5 + random.below(10) as u64],
+                vec![array(&(center - u)), array(&(center + u))],
+                path.iter().map(array).collect(),
+            )
+            .with_snap(snap)
+        }
         _ => {
             let frames = 2 + random.below(6) as u64;
             let middle = center + normal * size * 0.3;
@@ -358,6 +398,27 @@ fn random_stroke(simulation: &Simulation, random: &mut Random) -> StrokeSpec {
             .with_snap(snap)
         }
     }
+}
+
+/// A stroke moved aside by 0.02 to 0.22 edges.
+fn beside(mut stroke: StrokeSpec, simulation: &Simulation, random: &mut Random) -> StrokeSpec {
+    let mesh = simulation.mesh();
+    let edge = (mesh.total_volume() / mesh.tets.len().max(1) as f64 * 8.0).cbrt();
+    let by = random.direction() * edge * (0.02 + 0.2 * random.unit());
+    let shift = |x: &mut [f64; 3]| *x = (DVec3::from_array(*x) + by).to_array();
+    match &mut stroke {
+        StrokeSpec::Plane { point, .. } => shift(point),
+        StrokeSpec::Rectangle { center, .. } => shift(center),
+        StrokeSpec::Surface { points, .. } => points.iter_mut().for_each(shift),
+        StrokeSpec::Sweep { blade, .. } => blade.iter_mut().for_each(shift),
+        StrokeSpec::Punch { region, .. } | StrokeSpec::Remove { region, .. } => {
+            if let Region::Sphere { center, .. } = region {
+                shift(center);
+            }
+        }
+        _ => unreachable!("random strokes are of these kinds"),
+    }
+    stroke
 }
 
 /// Moves a stroke to start at a frame.

@@ -6,6 +6,7 @@ use foldhash::fast::FixedState;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::faces::{Behind, Face, Faces};
+use crate::places::Places;
 use crate::stars::VertexStars;
 use crate::{BoundaryTriangle, CutError};
 
@@ -21,6 +22,10 @@ pub struct CuttableMesh {
     pub(crate) faces: Faces,
     /// How far planes and level sets were bent to particles. Never iterated.
     pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
+    /// How far improvement has moved cut faces around particles, in m. Never iterated.
+    pub(crate) drift: HashMap<ParticleId, f64, FixedState>,
+    /// Which particles are at one place.
+    pub(crate) places: Places,
     /// The mean volume of the tets that the mesh was made of, in m³.
     pub(crate) mean_volume: f64,
     /// The particles that the appended meshes were made of: first and end of each range, ascending.
@@ -44,6 +49,8 @@ impl CuttableMesh {
             stars,
             faces,
             bent: HashMap::default(),
+            drift: HashMap::default(),
+            places: Places::new(edge_of(mean_volume)),
         })
     }
 
@@ -81,8 +88,30 @@ impl CuttableMesh {
         self.faces.append(&other.faces);
         let bent = other.bent.iter().map(|(&p, &by)| (shifted(p), by));
         self.bent.extend(bent);
+        let drift = other.drift.iter().map(|(&p, &by)| (shifted(p), by));
+        self.drift.extend(drift);
+        self.places
+            .append(&other.places, &other.mesh.positions, first);
         let original = other.original.iter().map(|range| range.map(|p| first + p));
         self.original.extend(original);
+    }
+
+    /// The edge of a regular tet with the mean volume of the tets that the mesh was made of, in m.
+    pub(crate) fn mean_edge(&self) -> f64 {
+        edge_of(self.mean_volume)
+    }
+
+    /// Returns whether a particle has tets around it and none of the boundary triangles. O(tets around it).
+    ///
+    /// # Panics
+    /// If the particle does not exist.
+    #[must_use]
+    pub fn is_inside(&self, particle: ParticleId) -> bool {
+        let mut faces = self.around(particle).flat_map(Face::of);
+        let is_at = |face: &Face| face.particles(&self.mesh).contains(&particle);
+        let is_bounded =
+            faces.any(|face| is_at(&face) && matches!(self.faces.behind(face), Behind::Nothing(_)));
+        !is_bounded && self.around(particle).next().is_some()
     }
 
     /// Whether a particle is of a mesh as it was made, not of a cut.
@@ -179,4 +208,9 @@ impl CuttableMesh {
         );
         Ok(())
     }
+}
+
+/// The edge of a regular tet with a volume: e³ / (6 √2).
+fn edge_of(volume: f64) -> f64 {
+    (volume * 6.0 * std::f64::consts::SQRT_2).cbrt()
 }

@@ -8,17 +8,18 @@
 //! - no tet is inverted or nearly so, neither at rest nor in the present shape;
 //! - the smallest sine of a dihedral angle around grows, or stays above [`GOOD`];
 //! - the boundary keeps its shape. Outer faces stay in their planes to rounding. A cut face moves at most by
-//!   [`ImproveOptions::tolerance`], and only together with the face opposite to it on the other side of the cut, so
-//!   that one side gains what the other loses and the volume stays to rounding; a cut face whose other side is
-//!   different stays in its plane. Rims and corners of cut faces move along the rim only, the front of an unfinished cut
-//!   not at all.
+//!   [`ImproveOptions::tolerance`] over all calls, and only together with the face opposite to it on the other side of
+//!   the cut, so that one side gains what the other loses and the volume stays to rounding. Where cuts cross, the
+//!   particles of all parts that meet at a place are therefore merged at once. A cut face whose other side is different
+//!   stays in its plane. Rims and corners of cut faces move along a rim only, the front of an unfinished cut not at all.
 //!
 //! Original particles are never taken out, so the mesh does not become coarser than it was made. Cost: each round looks
-//! at the particles around the changes of the round before, each with the tets around it and its neighbors.
+//! at the particles around the changes of the round before, each with the tets around it and its neighbors; a call ends
+//! after [`ImproveOptions::max_tets`] and leaves the rest to the next one.
 
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::cell::Cell;
+use std::collections::{BTreeMap, BTreeSet};
 
-use foldhash::fast::FixedState;
 use glam::DVec3;
 use incise_mesh::{ParticleId, TetId};
 
@@ -33,27 +34,35 @@ use crate::{CutError, CuttableMesh};
 const GOOD: f64 = 0.2;
 /// Largest distance of an outer face from its plane, and of a cut face without another side, in edges of a mean tet.
 const EXACT: f64 = 1e-10;
-/// Smallest cosine between normals of faces of one kind around a particle that count as smooth.
-const SMOOTH: f64 = 0.8;
+/// Smallest cosine between the normals of a face before and after.
+const SMOOTH: f64 = 0.5;
+/// Smallest cosine between the normals of neighboring faces of a cut; where they fold more, the cut ends.
+const FRONT: f64 = 0.0;
+/// Particles of which the shortest are taken out first.
+const CHUNK: usize = 128;
 /// In the present shape a tet must keep this fraction of its volume at rest, or half of the smallest around it.
 const PRESENT: f64 = 0.3;
 
 /// Limits of [`improve`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImproveOptions {
-    /// Largest distance by which a call moves a cut face, as a fraction of the edge of a regular tet with the mean
-    /// volume of the original ones; from 0 to 0.25.
+    /// Largest distance by which all calls together move a cut face, as a fraction of the edge of a regular tet with the
+    /// mean volume of the original ones; from 0 to 0.25.
     pub tolerance: f64,
     /// Whether all boundary triangles keep their particles, so that only particles inside are taken out.
     pub keeps_boundary: bool,
+    /// Number of tets to look at after which a call ends; one counts each time its shape is computed. A call looks at one
+    /// particle at least.
+    pub max_tets: usize,
 }
 
 impl Default for ImproveOptions {
-    /// Tolerance 0.05, boundary triangles may change.
+    /// Tolerance 0.05, boundary triangles may change, no limit of the work.
     fn default() -> Self {
         Self {
             tolerance: 0.05,
             keeps_boundary: false,
+            max_tets: usize::MAX,
         }
     }
 }
@@ -62,7 +71,8 @@ impl Default for ImproveOptions {
 ///
 /// # Arguments
 /// `positions` are the present positions of the particles. `near` are particles to begin with, such as the corners of
-/// the tets that a stroke created ([`CutDelta::created_particles`]). Particles for which `is_locked` is true stay; lock
+/// the tets that a stroke created ([`CutDelta::created_particles`]); afterwards those that the next call is to begin with,
+/// none if the work is done. Particles for which `is_locked` is true stay; lock
 /// those that something else refers to and those between materials. It is given the mesh in progress, in which tets that
 /// stay have their slots from before.
 ///
@@ -90,9 +100,9 @@ impl Default for ImproveOptions {
 /// let tets = body.mesh().tets.len();
 ///
 /// let rest = body.mesh().positions.clone();
-/// let near = cut.created_particles();
-/// let delta = improve(&mut body, &rest, &near, &ImproveOptions::default(), |_, _| false)?;
-/// assert!(delta.collapsed > 0 && body.mesh().tets.len() < tets);
+/// let mut near = cut.created_particles();
+/// let delta = improve(&mut body, &rest, &mut near, &ImproveOptions::default(), |_, _| false)?;
+/// assert!(near.is_empty() && delta.collapsed > 0 && body.mesh().tets.len() < tets);
 /// assert_eq!(body.mesh().pieces().count, 2);
 /// assert!((body.mesh().total_volume() - 1.0).abs() < 1e-12);
 /// # Ok::<(), incise_cutting::CutError>(())
@@ -100,7 +110,7 @@ impl Default for ImproveOptions {
 pub fn improve(
     cuttable: &mut CuttableMesh,
     positions: &[DVec3],
-    near: &[ParticleId],
+    near: &mut Vec<ParticleId>,
     options: &ImproveOptions,
     is_locked: impl Fn(&CuttableMesh, ParticleId) -> bool,
 ) -> Result<CutDelta, CutError> {
@@ -111,8 +121,7 @@ pub fn improve(
         });
     }
     require_positions(cuttable.mesh(), positions)?;
-    // Volume of a regular tet with edge e: e³ / (6 √2).
-    let edge = (cuttable.mean_volume * 6.0 * std::f64::consts::SQRT_2).cbrt();
+    let edge = cuttable.mean_edge();
     let mut improvement = Improvement {
         exact: EXACT * edge,
         tolerance: options.tolerance * edge,
@@ -121,11 +130,11 @@ pub fn improve(
         positions,
         first: BTreeMap::new(),
         deleted: BTreeSet::new(),
-        at: HashMap::default(),
-        moved: HashMap::default(),
+        drift_before: BTreeMap::new(),
+        looked_at: Cell::new(0),
         collapsed: 0,
     };
-    improvement.run(near, &is_locked);
+    improvement.run(near, options.max_tets, &is_locked);
     Ok(improvement.finish())
 }
 
@@ -142,6 +151,8 @@ struct Original {
 struct FanFace {
     next: [ParticleId; 2],
     tag: FaceTag,
+    /// Whether the other side of the cut has this face too.
+    is_mirrored: bool,
 }
 
 /// What is around a particle.
@@ -171,7 +182,11 @@ impl Star {
             let corners = face.particles(&cuttable.mesh);
             let k = corners.iter().position(|p| *p == particle)?;
             let next = [corners[(k + 1) % 3], corners[(k + 2) % 3]];
-            Some(FanFace { next, tag })
+            Some(FanFace {
+                next,
+                tag,
+                is_mirrored: false,
+            })
         });
         let fan = fan.collect();
         Self {
@@ -214,6 +229,18 @@ impl Star {
         rims
     }
 
+    /// The particles that it may be merged into.
+    fn targets(&self) -> Vec<ParticleId> {
+        let rims = self.rims();
+        if self.fan.is_empty() {
+            self.neighbors.clone()
+        } else if rims.is_empty() {
+            self.fan_neighbors()
+        } else {
+            rims
+        }
+    }
+
     /// The other ends of the edges of the fan, ascending.
     fn fan_neighbors(&self) -> Vec<ParticleId> {
         let mut ends: Vec<ParticleId> = self.fan.iter().map(|face| face.next[0]).collect();
@@ -231,11 +258,20 @@ struct Improvement<'a> {
     keeps_boundary: bool,
     first: BTreeMap<TetId, Original>,
     deleted: BTreeSet<TetId>,
-    /// The particles seen at each position at rest. Never iterated.
-    at: HashMap<[u64; 3], Vec<ParticleId>, FixedState>,
-    /// How far the cut faces around a particle have moved so far. Never iterated.
-    moved: HashMap<ParticleId, f64, FixedState>,
+    /// How far cut faces had been moved before, around those particles where that changes.
+    drift_before: BTreeMap<ParticleId, f64>,
+    /// Tets looked at, each time counted.
+    looked_at: Cell<usize>,
     collapsed: usize,
+}
+
+/// The worst shapes of the tets around a particle.
+#[derive(Clone, Copy)]
+struct Shape {
+    /// The smallest sine of a dihedral angle at rest.
+    sine: f64,
+    /// The smallest volume now, as a fraction of that at rest.
+    scale: f64,
 }
 
 /// A particle to be merged into another one.
@@ -243,7 +279,7 @@ struct Improvement<'a> {
 struct Collapse {
     from: ParticleId,
     to: ParticleId,
-    /// How far cut faces move.
+    /// How far cut faces have moved then, in all.
     distance: f64,
 }
 
@@ -252,47 +288,67 @@ impl Improvement<'_> {
         self.cuttable.mesh.positions[particle.index()]
     }
 
-    fn key(&self, particle: ParticleId) -> [u64; 3] {
-        // 0.0 and -0.0 are one position.
-        self.rest(particle).to_array().map(|c| (c + 0.0).to_bits())
+    /// The first particle at a particle's place, which stands for the place.
+    fn place(&self, particle: ParticleId) -> ParticleId {
+        let CuttableMesh { mesh, places, .. } = &*self.cuttable;
+        let there = places.at(mesh, self.rest(particle)).min();
+        there.unwrap_or(particle).min(particle)
     }
 
-    /// Rounds until one changes nothing. Ends, since each change takes a particle out.
-    fn run(&mut self, near: &[ParticleId], is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool) {
-        let mut active: BTreeSet<ParticleId> = near.iter().copied().collect();
-        while !active.is_empty() {
-            let mut due: Vec<(f64, ParticleId)> = Vec::new();
-            for &particle in &active {
-                self.see(particle);
-                let mut shortest = f64::INFINITY;
-                for neighbor in Star::of(self.cuttable, particle).neighbors {
-                    self.see(neighbor);
-                    let length = self.rest(particle).distance_squared(self.rest(neighbor));
-                    shortest = shortest.min(length);
+    /// Rounds until one changes nothing or the work is at its limit. Ends, since each change takes a particle out.
+    fn run(
+        &mut self,
+        near: &mut Vec<ParticleId>,
+        max_tets: usize,
+        is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
+    ) {
+        near.sort_unstable();
+        near.dedup();
+        let mut round = std::mem::take(near).into_iter();
+        let mut next: BTreeSet<ParticleId> = BTreeSet::new();
+        let mut due: Vec<(f64, ParticleId)> = Vec::new();
+        let mut is_over = false;
+        while !is_over {
+            if round.as_slice().is_empty() {
+                if next.is_empty() {
+                    return;
                 }
-                let is_created = !self.cuttable.is_original(particle);
-                if is_created && shortest.is_finite() && !is_locked(self.cuttable, particle) {
+                round = Vec::from_iter(std::mem::take(&mut next)).into_iter();
+            }
+            due.clear();
+            for particle in round.by_ref().take(CHUNK) {
+                if self.cuttable.is_original(particle) || is_locked(self.cuttable, particle) {
+                    continue;
+                }
+                let mut shortest = f64::INFINITY;
+                let tets = self.cuttable.around(particle);
+                for neighbor in tets.flat_map(|tet| self.cuttable.mesh.tets[tet.index()]) {
+                    if neighbor != particle {
+                        let length = self.rest(particle).distance_squared(self.rest(neighbor));
+                        shortest = shortest.min(length);
+                    }
+                }
+                if shortest.is_finite() {
                     due.push((shortest, particle));
                 }
             }
             due.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-            active.clear();
-            for (_, particle) in due {
-                for to in self.take_out(particle, is_locked) {
-                    active.insert(to);
-                    active.extend(Star::of(self.cuttable, to).neighbors);
+            for &(_, particle) in &due {
+                if is_over {
+                    next.insert(particle);
+                    continue;
                 }
+                for to in self.take_out(particle, is_locked) {
+                    next.insert(to);
+                    next.extend(Star::of(self.cuttable, to).neighbors);
+                }
+                is_over = self.looked_at.get() >= max_tets;
             }
         }
-    }
-
-    /// Notes where a particle is at rest.
-    fn see(&mut self, particle: ParticleId) {
-        let key = self.key(particle);
-        let there = self.at.entry(key).or_default();
-        if !there.contains(&particle) {
-            there.push(particle);
-        }
+        near.extend(round);
+        near.extend(next);
+        near.sort_unstable();
+        near.dedup();
     }
 
     /// Merges a particle into the neighbor with the best result, if there is one. Returns the particles merged into.
@@ -302,31 +358,53 @@ impl Improvement<'_> {
         is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
     ) -> Vec<ParticleId> {
         let star = Star::of(self.cuttable, particle);
+        self.looked_at.set(self.looked_at.get() + star.tets.len());
         // A change of this round may have locked it.
-        if star.tets.is_empty()
-            || is_locked(self.cuttable, particle)
-            || !star.is_single_fan()
+        if is_locked(self.cuttable, particle)
+            || !self.is_movable(&star)
             || (self.keeps_boundary && !star.fan.is_empty())
         {
             return Vec::new();
         }
-        let twin = self
-            .twin(&star)
-            .filter(|twin| !is_locked(self.cuttable, twin.particle));
-        let rims = star.rims();
-        let targets = match rims.len() {
-            0 if star.fan.is_empty() => star.neighbors.clone(),
-            0 => star.fan_neighbors(),
-            2 => rims,
-            _ => return Vec::new(),
-        };
+        // Most particles that must stay are at rims and corners, which is known before their other sides are.
+        let mut targets = star.targets();
+        targets.retain(|to| self.may_bend(&star, *to, true).is_some());
+        if targets.is_empty() {
+            return Vec::new();
+        }
+        let mut parts = self.parts(star, is_locked);
         let mut best: Option<(f64, Vec<Collapse>)> = None;
-        for to in targets {
-            if let Some((quality, collapses)) = self.collapses(&star, twin.as_ref(), to)
-                && best.as_ref().is_none_or(|(most, _)| quality > *most)
-            {
-                best = Some((quality, collapses));
+        loop {
+            let places = self.places_of(&parts);
+            let mut shapes: Vec<Shape> = Vec::new();
+            for &to in &targets {
+                let Some(collapses) = self.collapses(&parts, &places, to) else {
+                    continue;
+                };
+                if shapes.is_empty() {
+                    shapes.extend(parts.iter().map(|part| self.shape(part)));
+                }
+                let least = best.as_ref().map_or(f64::NEG_INFINITY, |(most, _)| *most);
+                let mut quality = f64::INFINITY;
+                let is_better =
+                    parts
+                        .iter()
+                        .zip(&shapes)
+                        .zip(&collapses)
+                        .all(|((part, shape), collapse)| {
+                            let of_part = self.quality(part, *shape, collapse.to, least);
+                            quality = quality.min(of_part.unwrap_or(f64::NEG_INFINITY));
+                            of_part.is_some()
+                        });
+                if is_better {
+                    best = Some((quality, collapses));
+                }
             }
+            if best.is_some() || parts.len() == 1 {
+                break;
+            }
+            // By itself, if all faces stay in their planes.
+            stay_alone(&mut parts);
         }
         let collapses = best.map_or(Vec::new(), |(_, collapses)| collapses);
         for collapse in &collapses {
@@ -335,127 +413,192 @@ impl Improvement<'_> {
         collapses.into_iter().map(|collapse| collapse.to).collect()
     }
 
-    /// The star of the particle on the other side of a cut, if the cut faces around are mirrored there.
-    fn twin(&self, star: &Star) -> Option<Star> {
-        let is_live = |p: &ParticleId| self.cuttable.around(*p).next().is_some();
-        let there = self.at.get(&self.key(star.particle))?;
-        let mut live = there.iter().copied().filter(is_live);
-        let (one, other, None) = (live.next()?, live.next()?, live.next()) else {
-            return None;
-        };
-        let twin = if one == star.particle { other } else { one };
-        if self.cuttable.is_original(twin) {
-            return None;
+    /// Whether a particle has tets, was created by a cut, is at no pinch of the boundary and not where a cut ends.
+    fn is_movable(&self, star: &Star) -> bool {
+        let is_created = !self.cuttable.is_original(star.particle);
+        if star.tets.is_empty() || !is_created || !star.is_single_fan() {
+            return false;
         }
-        let twin = Star::of(self.cuttable, twin);
-        let cut = |star: &Star, order: [usize; 2]| {
-            let faces = star.fan.iter().filter(|face| face.tag != FaceTag::Outer);
-            let mut keys: Vec<_> = faces
-                .map(|face| order.map(|k| self.key(face.next[k])))
-                .collect();
-            keys.sort_unstable();
-            keys
-        };
-        let mirrored = cut(star, [0, 1]) == cut(&twin, [1, 0]);
-        (mirrored && twin.is_single_fan()).then_some(twin)
+        star.fan.iter().all(|face| {
+            let before = star.fan.iter().find(|other| other.next[1] == face.next[0]);
+            let folds = |before: &FanFace| {
+                let at = self.rest(star.particle);
+                let [one, other] = [before, face].map(|face| self.normal(at, face));
+                one.dot(other) < FRONT * one.length() * other.length()
+            };
+            let is_inner = |before: &&FanFace| before.tag == face.tag && face.tag != FaceTag::Outer;
+            !before.filter(is_inner).is_some_and(folds)
+        })
     }
 
-    /// The collapses that take a particle out, on both sides of a cut if it has two, and the quality they lead to.
+    /// The normal of a boundary triangle with its first corner at a position, with a length of twice the area.
+    fn normal(&self, from: DVec3, face: &FanFace) -> DVec3 {
+        let [b, c] = face.next.map(|p| self.rest(p));
+        (b - from).cross(c - from)
+    }
+
+    /// The stars of a particle and of those at its place whose cut faces are the other sides of cut faces around it, of
+    /// those of theirs and so on; mirrored faces are marked. Only the first star if one of them must stay.
+    fn parts(
+        &self,
+        star: Star,
+        is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
+    ) -> Vec<Star> {
+        let mut parts = vec![star];
+        if parts[0].fan.iter().all(|face| face.tag == FaceTag::Outer) {
+            return parts;
+        }
+        let CuttableMesh { mesh, places, .. } = &*self.cuttable;
+        let particle = parts[0].particle;
+        let there = places.at(mesh, self.rest(particle));
+        let is_live = |p: &ParticleId| self.cuttable.around(*p).next().is_some();
+        let mut others: Vec<ParticleId> = there.filter(|p| *p != particle && is_live(p)).collect();
+        others.sort_unstable();
+        parts.extend(others.into_iter().map(|p| Star::of(self.cuttable, p)));
+
+        // Cut faces by their places, each way round.
+        let mut faces: Vec<([ParticleId; 2], bool, usize, usize)> = Vec::new();
+        for (i, part) in parts.iter().enumerate() {
+            for (k, face) in part.fan.iter().enumerate() {
+                if face.tag != FaceTag::Outer {
+                    let [a, b] = face.next.map(|p| self.place(p));
+                    faces.push(([a.min(b), a.max(b)], a < b, i, k));
+                }
+            }
+        }
+        faces.sort_unstable();
+        let mut groups: Vec<usize> = (0..parts.len()).collect();
+        for same in faces.chunk_by(|x, y| x.0 == y.0) {
+            // More than two are faces of more than two parts beside each other.
+            if let [(_, false, i, k), (_, true, j, l)] = *same
+                && i != j
+            {
+                parts[i].fan[k].is_mirrored = true;
+                parts[j].fan[l].is_mirrored = true;
+                let (keep, drop) = (groups[i].min(groups[j]), groups[i].max(groups[j]));
+                groups
+                    .iter_mut()
+                    .filter(|group| **group == drop)
+                    .for_each(|group| *group = keep);
+            }
+        }
+        let mut groups = groups.into_iter();
+        parts.retain(|_| groups.next() == Some(0));
+        let may_move =
+            |part: &Star| self.is_movable(part) && !is_locked(self.cuttable, part.particle);
+        if !parts[1..].iter().all(may_move) {
+            stay_alone(&mut parts);
+        }
+        parts
+    }
+
+    /// For all parts but the first the particles that theirs may be merged into, each with its place.
+    fn places_of(&self, parts: &[Star]) -> Vec<Vec<(ParticleId, ParticleId)>> {
+        let places = parts[1..].iter().map(|part| {
+            let targets = part.targets().into_iter();
+            targets.map(|target| (self.place(target), target)).collect()
+        });
+        places.collect()
+    }
+
+    /// The collapses that merge the particles of all parts at a place into their neighbors at another one, that of a
+    /// neighbor of the first; `None` if faces would move that must not, or one would change what is around another.
     fn collapses(
         &self,
-        star: &Star,
-        twin: Option<&Star>,
+        parts: &[Star],
+        places: &[Vec<(ParticleId, ParticleId)>],
         to: ParticleId,
-    ) -> Option<(f64, Vec<Collapse>)> {
-        let (bend, distance) = self.bend(star, to)?;
-        if bend <= self.exact && (star.fan.is_empty() || twin.is_none()) {
-            let quality = self.quality(star, to)?;
-            let from = star.particle;
-            return Some((quality, vec![Collapse { from, to, distance }]));
+    ) -> Option<Vec<Collapse>> {
+        let mut targets = vec![to];
+        let place = (!places.is_empty()).then(|| self.place(to));
+        for of_part in places {
+            let mut there = of_part.iter().filter(|(at, _)| Some(*at) == place);
+            let (Some((_, target)), None) = (there.next(), there.next()) else {
+                return None;
+            };
+            targets.push(*target);
         }
-        let twin = twin?;
-        if distance > self.tolerance {
-            return None;
+        let mut collapses: Vec<Collapse> = Vec::with_capacity(parts.len());
+        for (part, to) in parts.iter().zip(targets) {
+            collapses.push(Collapse {
+                from: part.particle,
+                to,
+                distance: self.may_bend(part, to, false)?,
+            });
         }
-        let key = self.key(to);
-        let mut others = twin.fan_neighbors().into_iter();
-        let other = others.find(|p| self.key(*p) == key)?;
-        let twin_rims = twin.rims();
-        if other == to
-            || !(twin_rims.is_empty() || (twin_rims.len() == 2 && twin_rims.contains(&other)))
-        {
-            return None;
+        // One must not change what is around another one.
+        for (i, part) in parts.iter().enumerate() {
+            for (j, other) in collapses.iter().enumerate() {
+                let has = |p: ParticleId| part.neighbors.binary_search(&p).is_ok();
+                if i != j && (has(other.from) || has(other.to) || other.to == part.particle) {
+                    return None;
+                }
+            }
         }
-        let is_apart = |star: &Star, others: [ParticleId; 2]| {
-            let mut corners = star
-                .tets
-                .iter()
-                .map(|tet| self.cuttable.mesh.tets[tet.index()]);
-            corners.all(|corners| others.iter().all(|p| !corners.contains(p)))
-        };
-        let are_apart =
-            is_apart(star, [twin.particle, other]) && is_apart(twin, [star.particle, to]);
-        let (_, other_distance) = self.bend(twin, other)?;
-        if !are_apart || other_distance > self.tolerance {
-            return None;
-        }
-        let quality = self.quality(star, to)?.min(self.quality(twin, other)?);
-        let pairs = [
-            (star.particle, to, distance),
-            (twin.particle, other, other_distance),
-        ];
-        let collapses = pairs.map(|(from, to, distance)| Collapse { from, to, distance });
-        Some((quality, collapses.to_vec()))
+        Some(collapses)
     }
 
-    /// How far cut faces move if a particle is merged into another one: by this, and together with all before. `None` if
-    /// outer faces move, or the boundary is not smooth enough.
-    fn bend(&self, star: &Star, to: ParticleId) -> Option<(f64, f64)> {
+    /// How far cut faces have been moved in all if a particle is merged into another one. `None` if faces move that must
+    /// not, too far, or turn too far. `is_mirrored` takes all cut faces for mirrored.
+    fn may_bend(&self, star: &Star, to: ParticleId, is_mirrored: bool) -> Option<f64> {
         let (at, target) = (self.rest(star.particle), self.rest(to));
-        let normal = |from: DVec3, face: &FanFace| {
-            let [b, c] = face.next.map(|p| self.rest(p));
-            (b - from).cross(c - from)
-        };
-        let mut bend: f64 = 0.0;
+        let drift = |p: &ParticleId| self.cuttable.drift.get(p).copied().unwrap_or(0.0);
+        let (mut bend, mut before): (f64, f64) = (0.0, 0.0);
         for face in &star.fan {
-            let kind = star.fan.iter().filter(|other| other.tag == face.tag);
-            let mean: DVec3 = kind.map(|other| normal(at, other)).sum();
-            let across = normal(at, face).try_normalize()?;
-            if face.tag != FaceTag::Outer && across.dot(mean.try_normalize()?) < SMOOTH {
-                return None;
+            if face.tag != FaceTag::Outer {
+                let corners = face.next.iter().chain([&star.particle]);
+                before = corners.map(drift).fold(before, f64::max);
             }
             if face.next.contains(&to) {
                 continue;
             }
+            let across = self.normal(at, face).try_normalize()?;
             let height = (target - at).dot(across).abs();
-            if face.tag == FaceTag::Outer && height > self.exact {
+            let may_move = face.is_mirrored || (is_mirrored && face.tag != FaceTag::Outer);
+            if height > self.exact && !may_move {
                 return None;
             }
-            if across.dot(normal(target, face).try_normalize()?) < SMOOTH {
+            if across.dot(self.normal(target, face).try_normalize()?) < SMOOTH {
                 return None;
             }
             bend = bend.max(height);
         }
-        let before = self.moved.get(&star.particle).copied().unwrap_or(0.0);
-        Some((bend, bend + before))
+        let distance = bend + before;
+        (bend <= self.exact || distance <= self.tolerance).then_some(distance)
     }
 
-    /// The smallest sine of a dihedral angle around after a collapse; `None` if it must not be made.
-    fn quality(&self, star: &Star, to: ParticleId) -> Option<f64> {
-        let mesh = &self.cuttable.mesh;
-        let rest = |corners: [ParticleId; 4]| corners.map(|p| self.rest(p));
-        let now = |corners: [ParticleId; 4]| corners.map(|p| self.positions[p.index()]);
-        let scale = |corners| volume(now(corners)) / volume(rest(corners));
-        let (mut before, mut scale_before) = (f64::INFINITY, f64::INFINITY);
+    /// The shape of the tets around a particle.
+    fn shape(&self, star: &Star) -> Shape {
+        self.looked_at.set(self.looked_at.get() + star.tets.len());
+        let mut shape = Shape {
+            sine: f64::INFINITY,
+            scale: f64::INFINITY,
+        };
         for tet in &star.tets {
-            let corners = mesh.tets[tet.index()];
-            before = before.min(least_sine(rest(corners)));
-            scale_before = scale_before.min(scale(corners));
+            let corners = self.cuttable.mesh.tets[tet.index()];
+            let [rest, now] = self.corners(corners);
+            shape.sine = shape.sine.min(least_sine(rest));
+            shape.scale = shape.scale.min(volume(now) / volume(rest));
         }
-        if scale_before <= 0.0 {
+        shape
+    }
+
+    /// The positions of particles at rest and now.
+    fn corners(&self, corners: [ParticleId; 4]) -> [[DVec3; 4]; 2] {
+        [
+            corners.map(|p| self.rest(p)),
+            corners.map(|p| self.positions[p.index()]),
+        ]
+    }
+
+    /// The smallest sine of a dihedral angle around after a collapse; `None` if it must not be made or this is not more than
+    /// `least`.
+    fn quality(&self, star: &Star, before: Shape, to: ParticleId, least: f64) -> Option<f64> {
+        if before.scale <= 0.0 {
             return None;
         }
-        let scale_limit = PRESENT.min(0.5 * scale_before);
+        let mesh = &self.cuttable.mesh;
+        let scale_limit = PRESENT.min(0.5 * before.scale);
         let (mut after, mut is_empty) = (f64::INFINITY, true);
         for tet in &star.tets {
             let mut corners = mesh.tets[tet.index()];
@@ -468,9 +611,11 @@ impl Improvement<'_> {
                     *corner = to;
                 }
             }
-            after = after.min(least_sine(rest(corners)));
-            let is_better = after >= GOOD || after > before;
-            if !is_better || is_thin(rest(corners)) || scale(corners) < scale_limit {
+            self.looked_at.set(self.looked_at.get() + 1);
+            let [rest, now] = self.corners(corners);
+            after = after.min(least_sine(rest));
+            let is_better = after > least && (after >= GOOD || after > before.sine);
+            if !is_better || is_thin(rest) || volume(now) < scale_limit * volume(rest) {
                 return None;
             }
         }
@@ -509,7 +654,8 @@ impl Improvement<'_> {
             let (mut edges, mut faces) = (Vec::new(), Vec::new());
             for tet in &star.tets {
                 let corners = mesh.tets[tet.index()].into_iter();
-                let mut face: Vec<ParticleId> = corners.filter(|p| *p != star.particle).collect();
+                let mut others = corners.filter(|p| *p != star.particle);
+                let mut face = [0; 3].map(|_: u8| others.next().unwrap_or(star.particle));
                 face.sort_unstable();
                 edges.extend([[face[0], face[1]], [face[0], face[2]], [face[1], face[2]]]);
                 faces.push(face);
@@ -612,8 +758,11 @@ impl Improvement<'_> {
                 }
             }
         }
-        let moved = self.moved.entry(to).or_insert(0.0);
-        *moved = moved.max(distance);
+        if distance > self.exact {
+            let drift = self.cuttable.drift.entry(to).or_insert(0.0);
+            self.drift_before.entry(to).or_insert(*drift);
+            *drift = drift.max(distance);
+        }
         self.collapsed += 1;
     }
 
@@ -623,6 +772,7 @@ impl Improvement<'_> {
             cuttable,
             first,
             deleted,
+            drift_before,
             collapsed,
             ..
         } = self;
@@ -631,6 +781,7 @@ impl Improvement<'_> {
             particles_before: mesh.positions.len(),
             tets_before: mesh.tets.len(),
             collapsed,
+            drift: drift_before.into_iter().collect(),
             worst_volume_ratio: 1.0,
             ..CutDelta::default()
         };
@@ -679,6 +830,14 @@ impl Improvement<'_> {
         delta.dihedral = dihedrals.range();
         fill_gaps(cuttable, &deleted, &mut delta);
         delta
+    }
+}
+
+/// Leaves the first part only, whose faces have no other sides then.
+fn stay_alone(parts: &mut Vec<Star>) {
+    parts.truncate(1);
+    for face in parts.iter_mut().flat_map(|part| &mut part.fan) {
+        face.is_mirrored = false;
     }
 }
 

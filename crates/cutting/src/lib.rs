@@ -46,6 +46,7 @@ mod operation;
 mod options;
 mod parallel;
 mod pieces;
+mod places;
 mod plane;
 mod quality;
 mod remove;

@@ -157,10 +157,16 @@ impl<'a> Operation<'a> {
             return Err(SplitError::TooThin(thin));
         }
 
-        for _ in &points {
+        for (point, &x) in points.iter().zip(&at_rest) {
+            let particle = ParticleId::new(mesh.positions.len());
+            mesh.positions.push(x);
             self.cuttable.stars.push_particle();
+            self.cuttable.places.enter(particle, x);
+            let drift = point.ends.map(|end| self.cuttable.drift.get(&end));
+            if let Some(&most) = drift.into_iter().flatten().max_by(|a, b| a.total_cmp(b)) {
+                self.cuttable.drift.insert(particle, most);
+            }
         }
-        mesh.positions.extend(at_rest);
         self.delta.points.extend(points);
         let mut touched = Vec::with_capacity(children.len());
         let mut children = children.into_iter();
@@ -245,8 +251,14 @@ impl<'a> Operation<'a> {
     pub(crate) fn push_copy(&mut self, source: ParticleId) -> ParticleId {
         let mesh = &mut self.cuttable.mesh;
         let copy = ParticleId::new(mesh.positions.len());
-        mesh.positions.push(mesh.positions[source.index()]);
+        let x = mesh.positions[source.index()];
+        mesh.positions.push(x);
         self.cuttable.stars.push_particle();
+        self.cuttable.places.enter(source, x);
+        self.cuttable.places.enter(copy, x);
+        if let Some(&drift) = self.cuttable.drift.get(&source) {
+            self.cuttable.drift.insert(copy, drift);
+        }
         if let Some(&distance) = self.cuttable.bent.get(&source) {
             self.cuttable.bent.insert(copy, distance);
         }

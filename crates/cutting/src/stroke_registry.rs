@@ -77,6 +77,13 @@ impl StrokeRegistry {
         self.known.retain(|key, _| key.0.index() < particles);
     }
 
+    /// Returns whether a particle is on the surface of an earlier stroke. Looks at each stroke that has marked it.
+    #[must_use]
+    pub fn is_on_surface(&self, particle: ParticleId) -> bool {
+        self.entries(particle)
+            .any(|(_, mark)| mark.tangent.is_some())
+    }
+
     pub(crate) fn next_stroke(&mut self) -> u32 {
         self.strokes += 1;
         self.strokes - 1

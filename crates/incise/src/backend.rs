@@ -664,7 +664,8 @@ mod tests {
             }
             let (mass, before, positions) = all(&any);
             let options = ImproveOptions::default();
-            let delta = improve(&mut cuttable, &positions, &near, &options, |_, _| false).unwrap();
+            let delta =
+                improve(&mut cuttable, &positions, &mut near, &options, |_, _| false).unwrap();
             assert!(delta.collapsed > 10);
             any.apply_delta(&delta, &cuttable).unwrap();
             let (mass_after, after, positions_after) = all(&any);

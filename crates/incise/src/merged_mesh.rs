@@ -189,6 +189,11 @@ impl MergedMesh {
             crumb_volume: delta.crumb_volume,
             collapsed: delta.collapsed,
             bent: delta.bent.iter().map(|&p| particle(p)).collect(),
+            drift: delta
+                .drift
+                .iter()
+                .map(|&(p, by)| (particle(p), by))
+                .collect(),
             worst_volume_ratio: delta.worst_volume_ratio,
             dihedral: delta.dihedral,
         };

@@ -226,6 +226,12 @@ impl Partition {
         label.filter(|&cluster| cluster != ClusterId::NONE)
     }
 
+    /// Whether the tets that a delta gives other corners stay in their clusters: those of an improvement, unless clusters
+    /// are merged around them. By themselves they would be clusters of one tet each.
+    fn keeps(&self, delta: &CutDelta) -> bool {
+        delta.collapsed > 0 && !self.settings.merges
+    }
+
     /// Takes cut and deleted tets out of their clusters, and notes their pairs and the clusters of relinked tets.
     fn take_out(&mut self, delta: &CutDelta) {
         self.lists.relinked.clear();
@@ -233,9 +239,14 @@ impl Partition {
             let cluster = self.cluster_of(tet.tet).unwrap_or(ClusterId::NONE);
             self.lists.relinked.push(cluster);
         }
-        for tet in delta.removed.iter().chain(&delta.deleted) {
+        let keeps = self.keeps(delta);
+        let removed = delta.removed.iter().map(|tet| (tet, keeps));
+        let deleted = delta.deleted.iter().map(|tet| (tet, false));
+        for (tet, keeps) in removed.chain(deleted) {
             if let Some(cluster) = self.cluster_of(tet.tet) {
-                self.clustering.remove(tet.tet.index());
+                if !keeps {
+                    self.clustering.remove(tet.tet.index());
+                }
                 let pairs = tet.corners.map(|p| (cluster.0, p.0));
                 self.lists.removed.extend(pairs);
             }
@@ -251,6 +262,9 @@ impl Partition {
     /// Makes clusters of the children on each side of each cut tet.
     fn add_groups(&mut self, delta: &CutDelta) -> Result<(), Error> {
         let _span = tracing::debug_span!("incise::cluster").entered();
+        if self.keeps(delta) {
+            return Ok(());
+        }
         let mut children: Vec<_> = delta
             .added
             .iter()

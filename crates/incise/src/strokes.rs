@@ -53,7 +53,8 @@ pub(crate) struct Timeline {
     crumbs: f64,
     /// Whether meshes are improved after strokes.
     improves: bool,
-    /// For each island the particles around the tets that strokes created since its mesh was improved.
+    /// For each island the particles around which its mesh is to be improved: those of the tets that strokes created, until
+    /// frames without a blade have worked on them.
     created: Vec<Vec<ParticleId>>,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
@@ -407,14 +408,11 @@ impl Timeline {
             return Ok(());
         }
         for (g, created) in self.created.iter_mut().enumerate() {
-            let mut created = std::mem::take(created);
             if created.is_empty() {
                 continue;
             }
-            created.sort_unstable();
-            created.dedup();
             let island = &mut islands[g];
-            let delta = island.improve(&created)?;
+            let delta = island.improve(created, &self.registries[g])?;
             if !delta.is_empty() {
                 apply_delta(g, island, &delta)?;
             }

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use incise_cutting::{
     CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, ImproveOptions, PieceTracker, Plane,
-    Skin, cut_plane, cut_surface, improve, remove_tets,
+    Skin, Sweep, cut_plane, cut_surface, improve, remove_tets,
 };
-use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
+use incise_mesh::{ParticleId, TetId, TetMesh, closest_on_triangle, kuhn_box};
 use proptest::prelude::*;
 
 use crate::bodies::{bend, body, check_cut, jittered_box, noise, options, strip, volumes};
@@ -59,18 +59,23 @@ impl Patient {
         let count = self.pieces.count();
         let worst = sines(&before).fold(1.0, f64::min);
         let boundary = triangles(&self.body);
-        let near = std::mem::take(&mut self.near);
-        let delta = improve(&mut self.body, &self.positions, &near, options, |_, p| {
-            locked(p)
-        })
+        let mut near = std::mem::take(&mut self.near);
+        let delta = improve(
+            &mut self.body,
+            &self.positions,
+            &mut near,
+            options,
+            |_, p| locked(p),
+        )
         .unwrap();
+        assert!(near.is_empty() || options.max_tets < usize::MAX);
         self.apply(&before, &delta);
-        self.near.clear();
+        self.near = near;
         assert_eq!(self.pieces.count(), count);
         let now = sines(self.body.mesh()).fold(1.0, f64::min);
         assert!(
-            now >= worst.min(0.2),
-            "the worst angle does not become worse"
+            now >= worst.min(0.2) * (1.0 - 1e-9),
+            "the worst angle does not become worse: {worst} {now}"
         );
         let inverted = |mesh: &TetMesh, positions: &[DVec3]| {
             let moved = TetMesh {
@@ -195,25 +200,31 @@ fn bad_tolerances_are_refused() {
             tolerance,
             ..ImproveOptions::default()
         };
-        let refused = improve(&mut body, &mesh.positions, &[], &options, |_, _| false);
+        let refused = improve(
+            &mut body,
+            &mesh.positions,
+            &mut Vec::new(),
+            &options,
+            |_, _| false,
+        );
         assert!(matches!(refused, Err(CutError::Improve { .. })));
     }
-    let refused = improve(&mut body, &[], &[], &ImproveOptions::default(), |_, _| {
-        false
-    });
+    let options = ImproveOptions::default();
+    let refused = improve(&mut body, &[], &mut Vec::new(), &options, |_, _| false);
     assert!(refused.is_err());
     assert_eq!(body.mesh(), &mesh);
 }
 
-/// Ten slices a tenth of an edge apart: with improvement the body has less than a quarter of the tets, and as many pieces.
+/// Ten slices a tenth of a cell apart, or a fifth where crossings move by snapping: with improvement the body has less than
+/// a quarter of the tets, and as many pieces.
 #[test]
 fn ten_thin_slices() {
-    for snap in [0.0, 0.1] {
+    for (snap, apart) in [(0.0, 0.1), (0.1, 0.2)] {
         let mesh = jittered_box(6, 0.1, 3);
         let run = |improves: bool| {
             let mut patient = Patient::new(&mesh, mesh.positions.clone());
             for i in 0..10 {
-                let point = DVec3::new(0.4 + 0.1 / 6.0 * f64::from(i), 0.0, 0.0);
+                let point = DVec3::new(0.35 + apart / 6.0 * f64::from(i), 0.0, 0.0);
                 patient.plane(point, DVec3::new(1.0, 0.1, 0.05), &options(snap));
                 if improves {
                     patient.improve(&ImproveOptions::default(), |_| false);
@@ -227,12 +238,162 @@ fn ten_thin_slices() {
             (mesh.tets.len(), slivers(mesh), patient.pieces.count())
         });
         let [(grown, bad, count), (tets, slivers, same)] = counts;
-        // Slices as thick as the snap distance exist as one sheet or not at all, which depends on the mesh.
-        let slack = usize::from(snap > 0.0);
-        assert!(count.abs_diff(same) <= slack, "{snap}: {count} {same}");
-        assert!(4 * tets < grown);
-        assert!(2 * slivers < bad);
+        assert_eq!((count, same), (11, 11), "{snap}");
+        assert!(4 * tets < grown, "{snap}: {tets} of {grown}");
+        assert!(2 * slivers < bad, "{snap}: {slivers} of {bad}");
     }
+}
+
+/// Short strokes across each other.
+fn short_strokes(
+    mesh: &TetMesh,
+    count: usize,
+    snap: f64,
+    options: Option<&ImproveOptions>,
+) -> Patient {
+    let mut patient = Patient::new(mesh, mesh.positions.clone());
+    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 8.0).cbrt();
+    for i in 0..count {
+        let direction =
+            |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(3, 20 * i + 3 * k + j)));
+        let center = DVec3::splat(0.5) + 0.3 * direction(0);
+        let along = direction(1).normalize_or(DVec3::X) * 3.0 * edge;
+        let path = direction(2).normalize_or(DVec3::Y) * 3.0 * edge;
+        let pose = |t: f64| [center - along + path * t, center + along + path * t];
+        let cut_options = CutOptions {
+            tag: u32::try_from(i).unwrap(),
+            ..crate::bodies::options(snap)
+        };
+        let mut stroke =
+            Sweep::new(&patient.body, &patient.positions, &pose(-1.0), cut_options).unwrap();
+        for t in [0.0, 1.0] {
+            let before = patient.body.mesh().clone();
+            let positions = patient.positions.clone();
+            let delta = stroke
+                .advance(&mut patient.body, &positions, &pose(t))
+                .unwrap();
+            patient.apply(&before, &delta);
+        }
+        if let Some(options) = options {
+            patient.improve(options, |_| false);
+        }
+    }
+    patient
+}
+
+/// Where strokes cross, four parts and more meet at a place: with improvement the body has half of the tets and less
+/// than half of the slivers, none of them away from features.
+#[test]
+fn strokes_across_each_other() {
+    for snap in [0.0, 0.1] {
+        let mesh = jittered_box(5, 0.1, 5);
+        let options = ImproveOptions::default();
+        let [plain, improved] = [None, Some(&options)].map(|options| {
+            let patient = short_strokes(&mesh, 16, snap, options);
+            (patient.body.mesh().tets.len(), slivers(patient.body.mesh()))
+        });
+        assert!(2 * improved.0 < plain.0, "{plain:?} {improved:?}");
+        assert!(2 * improved.1 < plain.1, "{plain:?} {improved:?}");
+    }
+}
+
+/// A call stops at its limit and leaves the rest: many small calls bring as much as a large one.
+#[test]
+fn limited_calls_continue() {
+    let mesh = jittered_box(4, 0.1, 3);
+    let run = |max_tets: usize| {
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        for i in 0..2 {
+            let point = DVec3::splat(0.41 + 0.03 * f64::from(i));
+            patient.plane(
+                point,
+                DVec3::new(1.0, 0.1 * f64::from(i), 0.05),
+                &options(0.0),
+            );
+        }
+        let options = ImproveOptions {
+            max_tets,
+            ..ImproveOptions::default()
+        };
+        let (mut calls, mut largest) = (0, 0);
+        while !patient.near.is_empty() {
+            let delta = patient.improve(&options, |_| false);
+            largest = largest.max(delta.collapsed);
+            calls += 1;
+        }
+        (patient.body.mesh().tets.len(), calls, largest)
+    };
+    let (all, one, _) = run(usize::MAX);
+    let (some, many, largest) = run(1000);
+    assert!(
+        one == 1 && many > 10 && largest < 40,
+        "{many} calls, {largest}"
+    );
+    assert!(20 * some.abs_diff(all) < all, "{some} {all}");
+}
+
+/// Over many rounds of cuts and improvement a cut face stays within the tolerance of its plane, which one more round must
+/// not extend.
+#[test]
+fn cut_faces_do_not_drift() {
+    let mesh = jittered_box(5, 0.1, 9);
+    let options = ImproveOptions {
+        tolerance: 0.05,
+        ..ImproveOptions::default()
+    };
+    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 6.0 * 2.0_f64.sqrt()).cbrt();
+    let mut patient = Patient::new(&mesh, mesh.positions.clone());
+    // Bent by snapping, so that it is no plane.
+    let [point, normal] = [DVec3::splat(0.47), DVec3::new(1.0, 0.2, 0.1)];
+    patient.plane(
+        point,
+        normal,
+        &CutOptions {
+            tag: 0,
+            ..self::options(0.1)
+        },
+    );
+    let first: Vec<[DVec3; 3]> = faces_of(&patient.body, 0);
+    let mut moved: f64 = 0.0;
+    for round in 1..12 {
+        patient.improve(&options, |_| false);
+        let turn = 0.7 * f64::from(round);
+        let across = DVec3::new(0.1 * turn.sin(), turn.cos(), turn.sin());
+        let options = CutOptions {
+            tag: round,
+            ..self::options(0.0)
+        };
+        patient.plane(
+            DVec3::splat(0.4 + 0.015 * f64::from(round)),
+            across,
+            &options,
+        );
+        for corners in faces_of(&patient.body, 0) {
+            for x in corners
+                .into_iter()
+                .chain([(corners[0] + corners[1] + corners[2]) / 3.0])
+            {
+                let far = first
+                    .iter()
+                    .map(|face| closest_on_triangle(*face, x).point.distance(x));
+                moved = moved.max(far.fold(f64::INFINITY, f64::min));
+            }
+        }
+        assert!(
+            moved <= 0.05 * edge,
+            "round {round}: {} edges",
+            moved / edge
+        );
+    }
+    assert!(moved > 1e-4 * edge);
+}
+
+/// The corners of the cut faces of a stroke.
+fn faces_of(body: &CuttableMesh, stroke: u32) -> Vec<[DVec3; 3]> {
+    let faces = body.boundary().filter(|t| t.tag == FaceTag::Cut(stroke));
+    faces
+        .map(|t| t.particles.map(|p| body.mesh().positions[p.index()]))
+        .collect()
 }
 
 proptest! {
@@ -243,7 +404,7 @@ proptest! {
     fn random_cuts(
         kind in 1_usize..6, seed in any::<u64>(), snap in prop::sample::select(vec![0.0, 0.1, 0.25]),
         tolerance in prop::sample::select(vec![0.0, 0.05, 0.25]), keeps_boundary in any::<bool>(),
-        locked in 1_usize..5,
+        locked in 1_usize..5, max_tets in prop::sample::select(vec![0, 300, usize::MAX]),
     ) {
         let mesh = body(kind, seed);
         let mut patient = Patient::new(&mesh, bend(&mesh, 0.2));
@@ -263,7 +424,7 @@ proptest! {
                 let delta = cut_surface(&mut patient.body, &positions, &surface, &options(snap)).unwrap();
                 patient.apply(&before, &delta);
             }
-            let options = ImproveOptions { tolerance, keeps_boundary };
+            let options = ImproveOptions { tolerance, keeps_boundary, max_tets };
             patient.improve(&options, |p| p.index() % 5 >= locked);
         }
         // What follows works on the mesh as it is.
