@@ -166,12 +166,14 @@ fn a_piece_in_contact_is_cut_again() {
             }
             assert_eq!(simulation.report().pieces, pieces);
             let contact = simulation.report().contact.unwrap();
+            // Where three pieces meet, a corner that is under the plane of one triangle and outside of its tet counts as
+            // deep, so the largest depth says less than what lies in the tets of other pieces.
             assert!(
-                contact.buried == 0 && contact.max_depth < 0.05,
+                contact.buried == 0 && contact.depth_p99 < 0.01 && contact.max_depth < 0.1,
                 "{contact:?}"
             );
+            assert_eq!(intruders(&simulation, 2e-3 * EDGE), 0);
         }
-        assert_eq!(intruders(&simulation, 2e-3 * EDGE), 0);
         (simulation, frames)
     };
     let (mut simulation, frames) = run(1);
