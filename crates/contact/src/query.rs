@@ -8,8 +8,9 @@
 //! 4. the closest point of the triangle is within reach and is a local minimum of the distance to the surface: on an
 //!    edge or a vertex no triangle around it is closer. So a flat or convex surface is touched once and a concave corner
 //!    by each of its walls. One triangle stands for all those around the edge or the vertex: the one that faces most;
-//! 5. outside, one of the nearest three. Inside, the nearest from which a way through tets leads to the vertex without
-//!    meeting one of the vertex's own tets, if its depth is less than half of the thickness there.
+//! 5. outside, one of the nearest three. Inside, of those that it does not lie behind at rest, the nearest from which a
+//!    way through tets leads to the vertex without meeting one of the vertex's own tets, if its depth is less than half
+//!    of the thickness there.
 //!
 //! A vertex inside a tet of a body that no such triangle explains is deep: from that tet the neighbors are searched for a
 //! way out, nearest first, up to 64 tets. If there is none, the vertex is buried.
@@ -47,6 +48,8 @@ const OUTSIDE: usize = 3;
 const TRIES: usize = 8;
 /// A way out that faces a vertex is taken unless it is this many times as long as another one.
 const FAR: f64 = 2.0;
+/// A vertex that has moved less than this part of its depth, relative to a triangle, has not come through it.
+const AS_AT_REST: f64 = 0.5;
 /// Tets that are looked at for a way out of a body.
 const DEEP_TETS: usize = 64;
 
@@ -316,10 +319,10 @@ impl Query<'_> {
                     return;
                 }
                 if let Some(near) = self.near(&vertex, slot) {
-                    if near.is_inside {
-                        inside.insert(near);
-                    } else {
+                    if !near.is_inside {
                         outside.insert(near);
+                    } else if !self.is_as_at_rest(&vertex, &near) {
+                        inside.insert(near);
                     }
                 }
             });
@@ -448,6 +451,33 @@ impl Query<'_> {
         };
         let is_held = slot != near.slot && self.pairs.partners(vertex.id).any(is_of_pair);
         (!is_held).then_some(contact)
+    }
+
+    /// Whether a vertex lies behind a triangle of its body as it does at rest, where parts do not overlap: the triangle is
+    /// the far side of a wall that ends at the vertex. Rounding decides whether a way through such a wall is valid.
+    fn is_as_at_rest(&self, vertex: &Vertex<'_>, near: &Near) -> bool {
+        let triangle = self.shape.triangle(near.slot);
+        let [first, ..] = triangle.particles;
+        if self.body_of[first.index()] != vertex.body {
+            return false;
+        }
+        let at_rest = &self.state.mesh.mesh().positions;
+        // In axes that turn with the triangle.
+        let seen = |positions: &[DVec3], x: DVec3| {
+            let [x1, x2, x3] = triangle.particles.map(|p| positions[p.index()]);
+            let (e1, e2) = (x2 - x1, x3 - x1);
+            let along = e1.normalize_or_zero();
+            let normal = e1.cross(e2).normalize_or_zero();
+            let way = x - x1;
+            DVec3::new(
+                way.dot(along),
+                way.dot(normal.cross(along)),
+                way.dot(normal),
+            )
+        };
+        let now = seen(self.state.positions, vertex.x);
+        let before = seen(at_rest, at_rest[vertex.id.index()]);
+        now.distance(before) < AS_AT_REST * near.distance
     }
 
     /// Whether the depth is less than half of the thickness there: a point as deep again is still inside.

@@ -207,6 +207,40 @@ fn after_200_deltas() {
     }
 }
 
+/// Where nothing has moved nothing overlaps, whatever was cut: crossing and thin slices, tips of cuts, removed tets.
+#[test]
+fn at_rest_nothing_is_inside() {
+    for seed in 0..6 {
+        let mut scene = Scene::new(&[shape(3, seed)], settings(true, 0.8));
+        for tag in 0..12 {
+            let number = 10 * tag as usize;
+            let middle = DVec3::splat(0.5) + direction(seed, number) * 0.4;
+            let (along, down) = (direction(seed, number + 1), direction(seed, number + 2));
+            let blade = |part: f64| [-0.2, 0.2].map(|t| middle + along * t + down * part);
+            let options = CutOptions {
+                tag,
+                snap: 0.1 * f64::from(tag % 3),
+                ..CutOptions::default()
+            };
+            let start = &scene.positions;
+            let mut sweep = Sweep::new(&scene.body, start, &blade(-0.3), options).unwrap();
+            for part in [-0.1, 0.1, 0.3] {
+                let delta = sweep
+                    .advance(&mut scene.body, &scene.positions, &blade(part))
+                    .unwrap();
+                scene.apply(&delta);
+                scene.search();
+                let edge = scene.contacts.mean_edge();
+                for contact in scene.contacts.faces() {
+                    let gap = contact.gap(&scene.positions) / edge;
+                    assert!(gap > -1e-6, "{seed}, {tag}: {gap} of an edge, {contact:?}");
+                }
+                assert_eq!(scene.contacts.buried(), 0);
+            }
+        }
+    }
+}
+
 /// Only bodies that may touch do; pieces of a body and the sides of a cut always do.
 #[test]
 fn what_may_touch() {

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use incise_contact::ContactState;
 use incise_cutting::{BoundaryTriangle, FaceTag};
 use incise_mesh::{ParticleId, TetId, TrianglePart, closest_on_triangle, signed_volume};
@@ -263,10 +263,10 @@ impl Slow<'_> {
                 self.normals[i] * if is_corner { angle } else { 1.0 }
             });
             let side: DVec3 = weighted.sum();
-            if side.dot(x - closest.point) < 0.0 {
-                inside.push((distance, i, closest, around));
-            } else {
+            if side.dot(x - closest.point) >= 0.0 {
                 outside.push((distance, i));
+            } else if self.moved_through(vertex, triangle) >= 0.5 * distance {
+                inside.push((distance, i, closest, around));
             }
         }
         let key = |i: usize| self.key(vertex, fan, i);
@@ -320,6 +320,22 @@ impl Slow<'_> {
         if others.any(contains) {
             expected.deep.insert(vertex);
         }
+    }
+
+    /// How far a vertex has moved since rest, in the frame of a triangle; infinite for one of another body.
+    fn moved_through(&self, vertex: u32, triangle: &BoundaryTriangle) -> f64 {
+        let body_of = self.scene.contacts.body_of();
+        if body_of[vertex as usize] != body_of[triangle.particles[0].index()] {
+            return f64::INFINITY;
+        }
+        let seen = |positions: &[DVec3]| {
+            let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
+            let x = (b - a).normalize();
+            let z = x.cross((c - a).normalize()).normalize();
+            let axes = DMat3::from_cols(x, z.cross(x), z);
+            axes.transpose() * (positions[vertex as usize] - a)
+        };
+        seen(&self.scene.positions).distance(seen(&self.scene.body.mesh().positions))
     }
 
     fn edges(&self) -> BTreeSet<[u32; 4]> {
@@ -380,7 +396,7 @@ impl Slow<'_> {
                     continue;
                 }
                 // Where both lines are closest, in coordinates along them.
-                let lines = glam::DMat3::from_cols(b - a, c - d, across).inverse() * (c - a);
+                let lines = DMat3::from_cols(b - a, c - d, across).inverse() * (c - a);
                 let clamped = |p: f64| p.clamp(0.0, 1.0);
                 let to = |x: DVec3, from: DVec3, end: DVec3| {
                     let t = (x - from).dot(end - from) / (end - from).length_squared();
