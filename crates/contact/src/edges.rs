@@ -26,7 +26,7 @@ use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
 use crate::index::index;
-use crate::query::Query;
+use crate::query::{AS_AT_REST, Query};
 use crate::surface::ContactSurface;
 use crate::tree::{Box32, TriangleTree};
 
@@ -345,15 +345,27 @@ fn contact(
         particles: [a, b, c, d],
         normal,
     };
-    if contact.gap(query.state.positions) >= 0.0 {
+    let gap = contact.gap(query.state.positions);
+    if gap >= 0.0 {
         return Some(contact);
+    }
+    if query.body_of[a as usize] == query.body_of[c as usize] {
+        // At rest parts do not overlap: edges that have passed each other there are those of a wall.
+        let at_rest = &query.state.mesh.mesh().positions;
+        let [x1, x2, x3, x4] = contact.particles.map(|p| at_rest[p as usize]);
+        let crossed = across(one.ends[1] - one.ends[0], two.ends[1] - two.ends[0])?;
+        let turned = across(x2 - x1, x4 - x3).map(|turned| turned * crossed.dot(normal).signum());
+        let before = turned.map(|normal| EdgeContact { normal, ..contact }.gap(at_rest));
+        if before.is_some_and(|before| before < AS_AT_REST * gap) {
+            return None;
+        }
     }
     let parts = on_lines(one.ends, two.ends);
     let meet = parts.iter().all(|part| (0.0..=1.0).contains(part));
     let is_valid = if meet {
         has_way(query, other, [q, p], edge) || has_way(query, edge, [p, q], other)
     } else {
-        contact.gap(query.state.positions) > -PASSED * query.mean_edge
+        gap > -PASSED * query.mean_edge
     };
     is_valid.then_some(contact)
 }

@@ -49,7 +49,7 @@ const TRIES: usize = 8;
 /// A way out that faces a vertex is taken unless it is this many times as long as another one.
 const FAR: f64 = 2.0;
 /// A vertex that has moved less than this part of its depth, relative to a triangle, has not come through it.
-const AS_AT_REST: f64 = 0.5;
+pub(crate) const AS_AT_REST: f64 = 0.5;
 /// Tets that are looked at for a way out of a body.
 const DEEP_TETS: usize = 64;
 
@@ -321,7 +321,7 @@ impl Query<'_> {
                 if let Some(near) = self.near(&vertex, slot) {
                     if !near.is_inside {
                         outside.insert(near);
-                    } else if !self.is_as_at_rest(&vertex, &near) {
+                    } else if !self.is_as_at_rest(&vertex, near.slot, near.distance) {
                         inside.insert(near);
                     }
                 }
@@ -428,7 +428,8 @@ impl Query<'_> {
         })
     }
 
-    /// `None` if a live pair holds the vertex there.
+    /// `None` if a live pair holds the vertex there, or if it lies below the surface as it does at rest, beside a concave
+    /// edge.
     fn contact(&self, vertex: &Vertex<'_>, near: &Near) -> Option<FaceContact> {
         let meeting = Meeting {
             vertex: vertex.id,
@@ -450,13 +451,15 @@ impl Query<'_> {
                 .any(|other| other.tag == tag)
         };
         let is_held = slot != near.slot && self.pairs.partners(vertex.id).any(is_of_pair);
-        (!is_held).then_some(contact)
+        let depth = -contact.gap(self.state.positions);
+        let is_as_at_rest = depth > 0.0 && self.is_as_at_rest(vertex, slot, depth);
+        (!is_held && !is_as_at_rest).then_some(contact)
     }
 
-    /// Whether a vertex lies behind a triangle of its body as it does at rest, where parts do not overlap: the triangle is
+    /// Whether a vertex lies as deep behind a triangle of its body as it does at rest, where parts do not overlap: the triangle is
     /// the far side of a wall that ends at the vertex. Rounding decides whether a way through such a wall is valid.
-    fn is_as_at_rest(&self, vertex: &Vertex<'_>, near: &Near) -> bool {
-        let triangle = self.shape.triangle(near.slot);
+    fn is_as_at_rest(&self, vertex: &Vertex<'_>, slot: u32, depth: f64) -> bool {
+        let triangle = self.shape.triangle(slot);
         let [first, ..] = triangle.particles;
         if self.body_of[first.index()] != vertex.body {
             return false;
@@ -477,7 +480,7 @@ impl Query<'_> {
         };
         let now = seen(self.state.positions, vertex.x);
         let before = seen(at_rest, at_rest[vertex.id.index()]);
-        now.distance(before) < AS_AT_REST * near.distance
+        now.distance(before) < AS_AT_REST * depth
     }
 
     /// Whether the depth is less than half of the thickness there: a point as deep again is still inside.

@@ -210,19 +210,29 @@ fn after_200_deltas() {
 /// Where nothing has moved nothing overlaps, whatever was cut: crossing and thin slices, tips of cuts, removed tets.
 #[test]
 fn at_rest_nothing_is_inside() {
-    for seed in 0..6 {
-        let mut scene = Scene::new(&[shape(3, seed)], settings(true, 0.8));
-        for tag in 0..12 {
+    for kind in 0..16 {
+        let seed = kind as u64;
+        let mut scene = Scene::new(&[shape(kind, seed)], settings(true, 0.8));
+        for tag in 0..24 {
             let number = 10 * tag as usize;
             let middle = DVec3::splat(0.5) + direction(seed, number) * 0.4;
             let (along, down) = (direction(seed, number + 1), direction(seed, number + 2));
             let blade = |part: f64| [-0.2, 0.2].map(|t| middle + along * t + down * part);
+            if tag % 5 == 4 {
+                let count = scene.body.mesh().tets.len();
+                let tets: Vec<TetId> = (0..4)
+                    .map(|i| TetId::new(below(count, seed, number + i)))
+                    .collect();
+                let delta = remove_tets(&mut scene.body, &tets, tag).unwrap();
+                scene.apply(&delta);
+                scene.search();
+            }
+            let start = &scene.positions;
             let options = CutOptions {
                 tag,
                 snap: 0.1 * f64::from(tag % 3),
                 ..CutOptions::default()
             };
-            let start = &scene.positions;
             let mut sweep = Sweep::new(&scene.body, start, &blade(-0.3), options).unwrap();
             for part in [-0.1, 0.1, 0.3] {
                 let delta = sweep
@@ -231,6 +241,13 @@ fn at_rest_nothing_is_inside() {
                 scene.apply(&delta);
                 scene.search();
                 let edge = scene.contacts.mean_edge();
+                for contact in scene.contacts.edges() {
+                    let gap = contact.gap(&scene.positions) / edge;
+                    assert!(
+                        gap > -1e-6,
+                        "edges {seed}, {tag}: {gap} of an edge, {contact:?}"
+                    );
+                }
                 for contact in scene.contacts.faces() {
                     let gap = contact.gap(&scene.positions) / edge;
                     assert!(gap > -1e-6, "{seed}, {tag}: {gap} of an edge, {contact:?}");

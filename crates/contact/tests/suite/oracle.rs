@@ -425,6 +425,18 @@ impl Slow<'_> {
                     _ => continue,
                 };
                 let gap = n.dot(p - q);
+                let body_of = self.scene.contacts.body_of();
+                if gap < 0.0 && body_of[ends[0] as usize] == body_of[others[0] as usize] {
+                    let [a, b] = ends.map(|p| rest[p as usize]);
+                    let [c, d] = others.map(|p| rest[p as usize]);
+                    let turned = (b - a).normalize().cross((d - c).normalize());
+                    let lines = DMat3::from_cols(b - a, c - d, turned).inverse() * (c - a);
+                    let (p, q) = (a.lerp(b, clamped(lines.x)), c.lerp(d, clamped(lines.y)));
+                    let before = turned.normalize().dot(p - q) * across.dot(n).signum();
+                    if turned.length() > 0.05 && before < 0.5 * gap {
+                        continue;
+                    }
+                }
                 // From one edge to the other through the tets behind the one, and as far again.
                 let has_way =
                     |tets: &[BoundaryTriangle; 2], [from, to]: [DVec3; 2], own: &[u32; 2]| {
@@ -526,7 +538,20 @@ pub(crate) fn found(scene: &Scene) -> BTreeSet<Key> {
 /// Compares with the slow search after an update that searched; returns what that found.
 pub(crate) fn compare(scene: &Scene) -> Expected {
     let (found, expected) = (found(scene), expected(scene));
-    let missing: Vec<&Key> = expected.contacts.difference(&found).collect();
+    // A vertex outside, beside a concave edge, may lie below the plane of a triangle. It is not held by it if it is where it
+    // is at rest.
+    let rest = &scene.body.mesh().positions;
+    let body = |p: u32| scene.contacts.body_of()[p as usize];
+    let height = |key: &Key, positions: &[DVec3]| {
+        let [x, a, b, c] = key.map(|p| positions[p as usize]);
+        (b - a).cross(c - a).normalize().dot(x - a)
+    };
+    let is_left_out = |key: &Key| {
+        let (before, now) = (height(key, rest), height(key, &scene.positions));
+        body(key[0]) == body(key[1]) && now < 0.0 && (before - now).abs() < -0.5 * now
+    };
+    let missing = expected.contacts.difference(&found);
+    let missing: Vec<&Key> = missing.filter(|key| !is_left_out(key)).collect();
     assert!(
         missing.is_empty(),
         "not found: {}",
