@@ -7,8 +7,11 @@ use proptest::prelude::*;
 /// Constraints of arity 0 to 4 on a few particles, often with several components.
 pub(crate) fn incidences() -> impl Strategy<Value = Incidence> {
     (4u32..40).prop_flat_map(|particles| {
-        vec(btree_set(0..particles, 0..=4), 0..60)
-            .prop_map(move |rows| Incidence::from_constraints(particles as usize, rows).unwrap())
+        vec(
+            btree_set(0..particles, 0..=4).prop_map(Vec::from_iter),
+            0..60,
+        )
+        .prop_map(move |rows| Incidence::from_constraints(particles as usize, rows).unwrap())
     })
 }
 

@@ -338,7 +338,7 @@ fn colors_must_fit() {
 
 /// Up to 60 constraints of up to 3 of 24 particles.
 fn incidences() -> impl Strategy<Value = Incidence> {
-    vec(btree_set(0u32..24, 0..=3), 0..60)
+    vec(btree_set(0u32..24, 0..=3).prop_map(Vec::from_iter), 0..60)
         .prop_map(|constraints| Incidence::from_constraints(24, constraints).unwrap())
 }
 

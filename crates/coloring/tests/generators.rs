@@ -83,7 +83,8 @@ pub(crate) fn erdos_renyi(max: u32) -> impl Strategy<Value = ConstraintGraph> {
 /// Constraints of zero to five particles each; few particles, so that some are crowded, or many.
 pub(crate) fn constraints(max: usize) -> impl Strategy<Value = Incidence> {
     (1u32..60).prop_flat_map(move |particles| {
-        let one = btree_set(0..particles, 0..=5usize.min(particles as usize));
+        let one =
+            btree_set(0..particles, 0..=5usize.min(particles as usize)).prop_map(Vec::from_iter);
         vec(one, 0..max).prop_map(move |constraints| {
             Incidence::from_constraints(particles as usize, constraints).unwrap()
         })

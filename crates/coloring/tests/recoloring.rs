@@ -305,6 +305,8 @@ fn a_large_number_adds_no_constraints_to_the_classes() {
     listed.sort_unstable();
     assert_eq!(listed, [0, 1, 2, 3, 1000]);
     assert_eq!(recoloring.add([[0u32, 2]]).unwrap().0, [4]);
+    let slices: Vec<&[u32]> = vec![&[1, 3, 4], &[0, 3]];
+    assert_eq!(recoloring.add(&slices).unwrap().0, [5, 6]);
     recoloring.check().unwrap();
 }
 

@@ -73,8 +73,8 @@ impl Incidence {
         })
     }
 
-    /// Builds an incidence from an iterator over lists of particle numbers, by value or by reference: from a
-    /// `Vec<[u32; 4]>`, a `&[[u32; 2]]` or a `&[Vec<u32>]`. O(particles + entries).
+    /// Builds an incidence from an iterator over slices of particle numbers, by value or by reference: from a
+    /// `Vec<[u32; 4]>`, a `&[[u32; 2]]`, a `&[Vec<u32>]` or a `&[&[u32]]`. O(particles + entries).
     ///
     /// # Errors
     /// A particle not below `particles`; a constraint that names a particle twice; more than
@@ -89,16 +89,24 @@ impl Incidence {
     ///
     /// let rods: &[Vec<u32>] = &[vec![0, 1, 2], vec![2, 3]];
     /// assert_eq!(Incidence::from_constraints(4, rods)?.particles_of(1), [2, 3]);
+    ///
+    /// let mixed: [&[u32]; 2] = [&tets[0], &rods[1]];
+    /// assert_eq!(Incidence::from_constraints(4, &mixed)?.particles_of(1), [2, 3]);
     /// # Ok::<(), incise_graph::GraphError>(())
     /// ```
-    pub fn from_constraints(
+    pub fn from_constraints<P: Borrow<u32>>(
         particles: usize,
-        constraints: impl IntoIterator<Item = impl IntoIterator<Item = impl Borrow<u32>>>,
+        constraints: impl IntoIterator<Item = impl AsRef<[P]>>,
     ) -> Result<Self, GraphError> {
         let mut offsets = vec![0];
         let mut values = Vec::new();
         for constraint in constraints {
-            values.extend(constraint.into_iter().map(|particle| *particle.borrow()));
+            values.extend(
+                constraint
+                    .as_ref()
+                    .iter()
+                    .map(|particle| *particle.borrow()),
+            );
             let end = u32::try_from(values.len()).map_err(|_| GraphError::TooMany {
                 what: "constraint-particle pairs",
                 count: values.len(),

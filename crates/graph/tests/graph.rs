@@ -11,7 +11,11 @@ use proptest::prelude::*;
 fn incidences() -> impl Strategy<Value = Incidence> {
     (1u32..12).prop_flat_map(|particles| {
         let arity = 0..=5.min(particles as usize);
-        vec(btree_set(0..particles, arity), 0..30).prop_map(move |constraints| {
+        vec(
+            btree_set(0..particles, arity).prop_map(Vec::from_iter),
+            0..30,
+        )
+        .prop_map(move |constraints| {
             Incidence::from_constraints(particles as usize, constraints).unwrap()
         })
     })

@@ -132,7 +132,7 @@ proptest! {
     ) {
         let rows = (0u32..)
             .zip(clustering.labels())
-            .map(|(c, _)| (0..arity).map(move |i| (c * 7 + i) % particles));
+            .map(|(c, _)| Vec::from_iter((0..arity).map(|i| (c * 7 + i) % particles)));
         let incidence = Incidence::from_constraints(particles as usize, rows).unwrap();
         let proper = coloring.verify_incidence(&incidence.quotient(&clustering)).is_ok();
         prop_assert_eq!(Schedule::new(&clustering, &coloring).check(&incidence).is_ok(), proper);

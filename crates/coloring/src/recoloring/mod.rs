@@ -258,7 +258,7 @@ impl Recoloring {
         }
     }
 
-    /// Adds constraints, each given by its particles, and colors them. Returns their numbers: the smallest that no
+    /// Adds constraints, each a slice of its particles by value or by reference, and colors them. Returns their numbers: the smallest that no
     /// constraint has. Cost: see the [report](Recolored).
     ///
     /// # Errors
@@ -280,16 +280,19 @@ impl Recoloring {
     /// }
     /// # Ok::<(), Box<dyn std::error::Error>>(())
     /// ```
-    pub fn add(
+    pub fn add<P: Borrow<u32>>(
         &mut self,
-        constraints: impl IntoIterator<Item = impl IntoIterator<Item = impl Borrow<u32>>>,
+        constraints: impl IntoIterator<Item = impl AsRef<[P]>>,
     ) -> Result<(Vec<u32>, Recolored), ColoringError> {
         let next = (0..).skip(self.links.vertex_count());
         let mut free = self.vacant.iter().copied().chain(next);
         let (mut numbers, mut added) = (Vec::new(), Vec::new());
         for (constraint, vertex) in constraints.into_iter().zip(&mut free) {
             let first = added.len();
-            let particles = constraint.into_iter().map(|particle| *particle.borrow());
+            let particles = constraint
+                .as_ref()
+                .iter()
+                .map(|particle| *particle.borrow());
             added.extend(particles.map(|particle| (vertex, particle)));
             if added.len() == first {
                 let vertex = u32::try_from(numbers.len()).unwrap_or(u32::MAX);

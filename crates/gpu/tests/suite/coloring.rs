@@ -215,7 +215,8 @@ fn random_graph() -> impl Strategy<Value = ConstraintGraph> {
 /// Constraints of zero to five particles each; few particles, so that some are crowded, or many.
 fn random_incidence() -> impl Strategy<Value = Incidence> {
     (1u32..60).prop_flat_map(|particles| {
-        let one = btree_set(0..particles, 0..=5usize.min(particles as usize));
+        let one =
+            btree_set(0..particles, 0..=5usize.min(particles as usize)).prop_map(Vec::from_iter);
         vec(one, 0..200).prop_map(move |constraints| {
             Incidence::from_constraints(particles as usize, constraints).unwrap()
         })
