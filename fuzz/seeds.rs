@@ -111,6 +111,8 @@ fn main() -> Result<(), MeshIoError> {
     for target in ["obj", "stl", "ply", "off"] {
         incise_mesh_io::write_surface(path(target, &format!("box.{target}")), &surface)?;
     }
+    incise_mesh_io::write_surface(path("gltf", "box.glb"), &surface)?;
+    incise_mesh_io::write_surface(path("gltf", "box.gltf"), &surface)?;
     incise_mesh_io::write_stl_binary(path("stl", "binary.stl"), &surface)?;
     incise_mesh_io::write_ply(path("ply", "text.ply"), &surface, PlyEncoding::Ascii)?;
     incise_mesh_io::write_ply(path("ply", "big.ply"), &surface, PlyEncoding::BigEndian)?;

@@ -43,7 +43,10 @@ fn check_corners(corners: &[ParticleId], particles: usize) {
 fn check_error(error: &MeshIoError) {
     let kinds = matches!(
         error,
-        MeshIoError::Empty | MeshIoError::Parse { .. } | MeshIoError::ParseBytes { .. }
+        MeshIoError::Empty
+            | MeshIoError::Parse { .. }
+            | MeshIoError::ParseBytes { .. }
+            | MeshIoError::ParseContent { .. }
     );
     assert!(kinds, "{error}");
 }

@@ -109,6 +109,9 @@ pub(crate) struct RunArguments {
     /// Write an animation: .gif, or .png for an animated PNG.
     #[arg(long, value_name = "FILE", alias = "film")]
     pub(crate) animation: Option<PathBuf>,
+    /// Images of the animation for each second, shown at this rate [default: about 25].
+    #[arg(long, value_name = "N", value_parser = rate, requires = "animation")]
+    pub(crate) fps: Option<f64>,
     /// Width and height of images in pixels [default: 640x480].
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[u32; 2]>,
@@ -150,6 +153,13 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     sides
         .filter(fits)
         .ok_or_else(|| format!("two numbers from 1 to {LARGEST_SIDE}, as in 960x720, are needed"))
+}
+
+/// A rate of images. Times of an image from 0.01 s to 10 s are supported.
+fn rate(text: &str) -> Result<f64, String> {
+    let rate = text.parse().ok();
+    rate.filter(|rate| (0.1..=100.0).contains(rate))
+        .ok_or_else(|| "a number from 0.1 to 100 is needed".to_owned())
 }
 
 /// A camera as in `-60,22` or `-60,22,1.5`.
@@ -230,7 +240,7 @@ pub(crate) struct ColorArguments {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum MeshCommand {
-    /// Check a mesh and print its statistics.
+    /// Check a mesh and print its statistics; of a surface, whether it can be filled.
     #[command(after_help = "Example: incise mesh info liver.vtk --json")]
     Info {
         /// The mesh.
@@ -248,8 +258,8 @@ pub(crate) enum MeshCommand {
         #[arg(long, value_name = "DT", default_value_t = 0.016)]
         time_step: f64,
     },
-    /// Convert a mesh between formats, which the file endings determine. Surface formats (.obj, .stl, .ply, .off, .glb,
-    /// .gltf) get the boundary of the mesh.
+    /// Convert a mesh or a surface between formats, which the file endings determine. Surface formats (.obj, .stl, .ply,
+    /// .off, .glb, .gltf) get the boundary of a mesh.
     #[command(after_help = "Example: incise mesh convert liver.node liver.vtu")]
     Convert {
         /// The mesh to read.
@@ -267,7 +277,7 @@ pub(crate) enum MeshCommand {
         Edges and corners are rounded to the size of a tet, and thinner parts are lost; the output gives the distances."
     )]
     Tetrahedralize {
-        /// The surface: .obj, .stl, .ply or .off.
+        /// The surface: .obj, .stl, .ply, .off, .glb or .gltf. Texture coordinates become values of particles.
         surface: PathBuf,
         /// The mesh to write.
         output: PathBuf,

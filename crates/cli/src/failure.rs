@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use anyhow::anyhow;
+use incise::mesh::MeshError;
 use incise::mesh_io::MeshIoError;
 use incise::meshing::MeshingError;
 use incise::{Error, shape_suggestion};
@@ -39,6 +40,12 @@ fn sentence(error: &anyhow::Error) -> String {
         if !sentence.contains(&cause) {
             sentence = format!("{sentence}: {cause}");
         }
+    }
+    if error
+        .chain()
+        .any(|cause| matches!(cause.downcast_ref(), Some(MeshError::Faulty(_))))
+    {
+        sentence += "; `incise mesh convert IN OUT --repair` repairs a file";
     }
     sentence.replace('\n', " ")
 }

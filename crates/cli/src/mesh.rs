@@ -1,13 +1,16 @@
 //! `incise mesh`: inspects, converts and generates meshes.
 
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::Context;
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
-use incise::mesh::{RepairOptions, TetMesh, TriangleSurface, repair};
-use incise::mesh_io;
-use incise::meshing::{Shape, Solid, generate, tetrahedralize};
+use incise::mesh::glam::{DVec2, DVec3};
+use incise::mesh::{Pieces, RepairOptions, TetMesh, TriangleSurface, closest_on_triangle, repair};
+use incise::mesh_io::{self, MeshFile, NamedValues, OwnedValues, SurfaceFile};
+use incise::meshing::{MeshingError, Shape, Solid, generate, tetrahedralize_with};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 
 use crate::args::MeshCommand;
@@ -90,21 +93,7 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             input,
             output,
             repair: wanted,
-        } => {
-            let mut file = mesh_io::read_file(input)?;
-            let mut report = None;
-            if *wanted {
-                let repaired = repair(&file.mesh, &RepairOptions::ALL);
-                report = Some(repaired.report);
-                file = file.repaired(repaired);
-            }
-            if mesh_io::is_surface(output) {
-                mesh_io::write_surface(output, &TriangleSurface::boundary_of(&file.mesh))?;
-            } else {
-                mesh_io::write_file(output, &file)?;
-            }
-            report.map_or(Ok(()), print)
-        }
+        } => convert(input, output, *wanted),
         MeshCommand::Tetrahedralize {
             surface,
             output,
@@ -115,24 +104,77 @@ pub(crate) fn mesh(command: &MeshCommand) -> Result<(), Failure> {
             shape,
             tets,
             output,
-        } => Ok(mesh_io::write(
-            output,
-            &generate(Shape::from_name(shape)?, *tets)?,
-        )?),
+        } => {
+            let mesh = generate(Shape::from_name(shape)?, *tets)?;
+            write(output, &MeshFile::from(mesh))
+        }
     }
 }
 
+/// Converts a mesh or a surface; the boundary of a mesh is a surface.
+fn convert(input: &Path, output: &Path, repaired: bool) -> Result<(), Failure> {
+    let (from, to) = (input.display(), output.display());
+    if mesh_io::is_surface(input) {
+        let why = if mesh_io::is_mesh(output) {
+            format!(
+                "{from} is a surface, and {to} is a mesh of tets: fill it by \
+                 `incise mesh tetrahedralize {from} {to} --tets 20000`"
+            )
+        } else if repaired {
+            format!("--repair is for meshes of tets, and {from} is a surface: omit it")
+        } else {
+            let file = mesh_io::read_surface_file(input)?;
+            return Ok(mesh_io::write_surface_file(output, &file)?);
+        };
+        return Err(Failure::Input(anyhow::Error::msg(why)));
+    }
+    let mut file = mesh_io::read_file(input)?;
+    let mut report = None;
+    if repaired {
+        let repaired = repair(&file.mesh, &RepairOptions::ALL);
+        report = Some(repaired.report);
+        file = file.repaired(repaired);
+    }
+    write(output, &file)?;
+    report.map_or(Ok(()), print)
+}
+
+/// Writes a mesh, or its boundary if the format is that of a surface.
+fn write(output: &Path, file: &MeshFile) -> Result<(), Failure> {
+    if mesh_io::is_surface(output) {
+        let surface = TriangleSurface::boundary_of(&file.mesh).without_unused();
+        return Ok(mesh_io::write_surface(output, &surface)?);
+    }
+    Ok(mesh_io::write_file(output, file)?)
+}
+
+/// Prints a warning to stderr.
+#[expect(clippy::print_stderr, reason = "warnings go to stderr")]
+fn warn(message: &str) {
+    eprintln!("warning: {message}");
+}
+
 /// Fills a surface and prints the deviation of the body from it.
-fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Failure> {
-    let surface = mesh_io::read_surface(file)?;
+fn fill(path: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Failure> {
+    if !(mesh_io::is_mesh(output) || mesh_io::is_surface(output)) {
+        // Names the known formats before minutes are spent.
+        mesh_io::write_file(output, &MeshFile::default())?;
+    }
+    let file = mesh_io::read_surface_file(path)?;
+    let surface = &file.surface;
     let named = |error| {
-        let error = anyhow::Error::new(error).context(file.display().to_string());
+        let error = anyhow::Error::new(error).context(path.display().to_string());
         Failure::Input(error)
     };
-    let solid = Solid::new(&surface).map_err(named)?;
-    let mesh = tetrahedralize(&solid, tets, levels).map_err(named)?;
-    mesh_io::write(output, &mesh)?;
+    let solid = Solid::new(surface).map_err(named)?;
+    let mesh = with_progress(&solid, tets, levels).map_err(named)?;
     let boundary = TriangleSurface::boundary_of(&mesh);
+    let mut filled = MeshFile::from(mesh);
+    if let Some(texture) = texture(&file, &solid, &filled.mesh) {
+        filled.particles.push(texture);
+    }
+    write(output, &filled)?;
+    let mesh = &filled.mesh;
     let back = Solid::new(&boundary).map_err(named)?;
     let prepared = solid.prepared();
     for (number, what, done) in [
@@ -154,11 +196,12 @@ fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Fail
     if prepared.inside_out {
         print("the surface was inside out; all triangles were reversed")?;
     }
+    let pieces = mesh.pieces();
     print(format!(
         "{}, {}, {}",
         count(mesh.tets.len(), "tet", "tets"),
         count(mesh.positions.len(), "particle", "particles"),
-        count(mesh.pieces().count, "piece", "pieces"),
+        count(pieces.count, "piece", "pieces"),
     ))?;
     print(format!(
         "volume {:.6} m³ (surface: {:.6} m³)",
@@ -166,21 +209,181 @@ fn fill(file: &Path, output: &Path, tets: usize, levels: u32) -> Result<(), Fail
         solid.volume()
     ))?;
     let size = (12.0 * mesh.total_volume() / mesh.tets.len() as f64).cbrt();
-    let missed = back.farthest(&surface);
     print(format!(
         "distance of the body from the surface: at most {:.2e} m (size of a tet: {size:.2e} m)",
         solid.farthest(&boundary),
     ))?;
+    let (place, missed) = back.farthest_point(surface);
     if missed > size {
-        print(format!(
-            "warning: parts of the surface up to {missed:.2e} m away are not covered (thinner than a tet, {size:.2e} m); \
-             increase --tets"
-        ))?;
+        warn(&format!(
+            "parts of the surface up to {missed:.2e} m away are not covered, the farthest at {} (thinner than a tet, \
+             {size:.2e} m); increase --tets",
+            coordinates(place)
+        ));
+    }
+    if pieces.count > prepared.shells {
+        warn(&format!(
+            "the body has {}, the surface has {}: the smallest piece is at {}; increase --tets",
+            count(pieces.count, "piece", "pieces"),
+            count(prepared.shells, "part", "parts"),
+            coordinates(smallest_piece(mesh, &pieces))
+        ));
     }
     Ok(())
 }
 
+/// Fills the solid, with a bar on a terminal.
+fn with_progress(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh, MeshingError> {
+    let template = "{spinner} lattice {pos} of at most {len}  {msg}  {elapsed}";
+    let style = ProgressStyle::with_template(template);
+    let bar =
+        ProgressBar::new(1).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.enable_steady_tick(Duration::from_millis(200));
+    let filled = tetrahedralize_with(solid, tets, levels, &mut |attempt| {
+        bar.set_length(u64::from(attempt.lattices));
+        bar.set_position(u64::from(attempt.lattice) + 1);
+        bar.set_message(format!(
+            "{} tets at a spacing of {:.2e} m",
+            attempt.tets, attempt.spacing
+        ));
+    });
+    bar.finish_and_clear();
+    filled
+}
+
+/// Texture coordinates of the particles of a body, those of the nearest points of the surface; `None` without a texture.
+fn texture(file: &SurfaceFile, solid: &Solid, mesh: &TetMesh) -> Option<NamedValues> {
+    if file.texture_corners.is_empty() {
+        return None;
+    }
+    let of_point = |point: &DVec3| {
+        let triangle = solid.nearest_triangle(*point);
+        let corners = file.surface.triangles[triangle].map(|p| file.surface.positions[p.index()]);
+        let weights = closest_on_triangle(corners, *point).weights;
+        let pairs = file.texture_of(triangle)?;
+        let sum: DVec2 = pairs
+            .into_iter()
+            .zip(weights)
+            .map(|(pair, w)| w * pair)
+            .sum();
+        Some(sum.extend(0.0))
+    };
+    let values: Option<Vec<DVec3>> = mesh.positions.iter().map(of_point).collect();
+    Some(NamedValues {
+        name: "texture_coordinates".to_owned(),
+        values: OwnedValues::Vectors(values?),
+    })
+}
+
+/// Center of the piece with the fewest tets, the mean of its tets' corners.
+fn smallest_piece(mesh: &TetMesh, pieces: &Pieces) -> DVec3 {
+    let mut counts = vec![0_usize; pieces.count];
+    let mut sums = vec![DVec3::ZERO; pieces.count];
+    for (tet, &piece) in mesh.tets.iter().zip(&pieces.labels) {
+        counts[piece as usize] += 1;
+        let corners = tet.iter().map(|p| mesh.positions[p.index()]);
+        sums[piece as usize] += corners.sum::<DVec3>() / 4.0;
+    }
+    let smallest = (0..pieces.count).min_by_key(|&piece| counts[piece]);
+    smallest.map_or(DVec3::ZERO, |piece| sums[piece] / counts[piece] as f64)
+}
+
+/// A point in three digits.
+fn coordinates(point: DVec3) -> String {
+    let [x, y, z] = point.to_array();
+    format!("({x:.3}, {y:.3}, {z:.3})")
+}
+
+/// JSON object printed by `incise mesh info --json` for a surface.
+#[derive(Debug, Serialize)]
+struct SurfaceReport {
+    input: String,
+    triangles: usize,
+    points: usize,
+    texture_coordinates: bool,
+    area: f64,
+    low: [f64; 3],
+    high: [f64; 3],
+    /// Whether the surface encloses a volume, so that it can be filled.
+    closed: bool,
+    /// The reason if not.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    fault: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    parts: Option<usize>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    volume: Option<f64>,
+}
+
+/// Prints what a surface is, and whether it can be filled.
+fn surface_info(path: &Path, json: bool) -> Result<(), Failure> {
+    let file = mesh_io::read_surface_file(path)?;
+    let surface = &file.surface;
+    let solid = Solid::new(surface);
+    let corners = || {
+        surface
+            .triangles
+            .iter()
+            .flatten()
+            .map(|p| surface.positions[p.index()])
+    };
+    let areas = surface.triangles.iter().map(|triangle| {
+        let [a, b, c] = triangle.map(|p| surface.positions[p.index()]);
+        0.5 * (b - a).cross(c - a).length()
+    });
+    let report = SurfaceReport {
+        input: path.display().to_string(),
+        triangles: surface.triangles.len(),
+        points: surface.positions.len(),
+        texture_coordinates: !file.texture_corners.is_empty(),
+        area: areas.sum(),
+        low: corners().fold(DVec3::INFINITY, DVec3::min).to_array(),
+        high: corners().fold(DVec3::NEG_INFINITY, DVec3::max).to_array(),
+        closed: solid.is_ok(),
+        fault: solid.as_ref().err().map(ToString::to_string),
+        parts: solid.as_ref().ok().map(|solid| solid.prepared().shells),
+        volume: solid.as_ref().ok().map(Solid::volume),
+    };
+    if json {
+        let json = serde_json::to_string(&report).map_err(|error| Failure::Run(error.into()))?;
+        return print(json);
+    }
+    let mut table = Table::new();
+    table.load_style(UTF8_FULL_CONDENSED);
+    table.set_header([report.input.as_str(), "surface of triangles"]);
+    let mut row = |name: &str, value: String| {
+        table.add_row([name.to_owned(), value]);
+    };
+    row("triangles", report.triangles.to_string());
+    row("points", report.points.to_string());
+    let texture = if report.texture_coordinates {
+        "yes"
+    } else {
+        "no"
+    };
+    row("texture coordinates", texture.to_owned());
+    row("area", format!("{:.6} m²", report.area));
+    let [low, high] =
+        [report.low, report.high].map(|corner| coordinates(DVec3::from_array(corner)));
+    row("bounding box", format!("{low} to {high} m"));
+    if let (Some(parts), Some(volume)) = (report.parts, report.volume) {
+        row("parts", parts.to_string());
+        row("volume", format!("{volume:.6} m³"));
+    }
+    print(table)?;
+    print(match &report.fault {
+        None => format!(
+            "fill it with tets: incise mesh tetrahedralize {} OUT.vtk --tets 20000",
+            report.input
+        ),
+        Some(fault) => fault.clone(),
+    })
+}
+
 fn info(file: &Path, json: bool, stiffness: &Stiffness) -> Result<(), Failure> {
+    if mesh_io::is_surface(file) {
+        return surface_info(file, json);
+    }
     let mesh = mesh_io::read(file)?;
     mesh.check()
         .with_context(|| file.display().to_string())

@@ -2,7 +2,7 @@
 //!
 //! Line files are written under a temporary name and renamed after the run has succeeded and all other files are
 //! written; other files are written to a temporary file and renamed. A final name therefore always refers to a complete
-//! file. Images of an earlier run in the folder are removed at the start, so that all images belong to one run.
+//! file. Images and surfaces of an earlier run in the folder are removed at the start, so that all belong to one run.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -10,12 +10,14 @@ use std::path::{self, Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 use anyhow::Context;
+use incise::cutting::FaceTag;
 use incise::mesh::glam::DVec3;
-use incise::mesh::{RepairOptions, TetMesh, repair};
+use incise::mesh::{RepairOptions, Surface, TetMesh, repair};
 use incise::mesh_io::{
     Field, Fields, MeshIoError, Values, write_atomically, write_pvd, write_vtp, write_vtu,
 };
 use incise::{Scene, Simulation};
+use incise_render::stretch;
 
 use crate::failure::Failure;
 use crate::files::{require_file, save_every};
@@ -75,11 +77,11 @@ impl Drop for Lines {
     }
 }
 
-/// Removes the images of an earlier run; files with other names stay.
-fn remove_pictures(folder: &Path) -> anyhow::Result<()> {
+/// Removes images and surfaces of an earlier run; files with other names stay.
+fn remove_old_frames(folder: &Path) -> anyhow::Result<()> {
     for entry in fs::read_dir(folder)? {
         let entry = entry?;
-        let is_ours = entry.file_name().to_str().is_some_and(is_picture);
+        let is_ours = entry.file_name().to_str().is_some_and(is_of_frames);
         if is_ours && entry.file_type()?.is_file() {
             let path = entry.path();
             fs::remove_file(&path).with_context(|| format!("cannot remove {}", path.display()))?;
@@ -88,13 +90,13 @@ fn remove_pictures(folder: &Path) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// True if a file name is one that a run gives its images.
-fn is_picture(name: &str) -> bool {
-    let number = name
-        .strip_prefix("frame_")
-        .and_then(|rest| rest.strip_suffix(".png"));
+/// True if a file name is one that a run gives to what it saves of its frames.
+fn is_of_frames(name: &str) -> bool {
+    let number = [("frame_", ".png"), ("surface_", ".vtp")]
+        .iter()
+        .find_map(|(start, end)| name.strip_prefix(start)?.strip_suffix(end));
     let is_number = |number: &str| number.len() >= 5 && number.bytes().all(|b| b.is_ascii_digit());
-    name == "contact_sheet.png" || number.is_some_and(is_number)
+    name == "contact_sheet.png" || name == "surface.pvd" || number.is_some_and(is_number)
 }
 
 /// Scene with absolute paths, independent of the folder it is written to.
@@ -142,7 +144,7 @@ impl Output {
             write_atomically(folder.join("scene.toml"), |file| {
                 file.write_all(toml.as_bytes())
             })?;
-            remove_pictures(folder)?;
+            remove_old_frames(folder)?;
             Ok(lines)
         };
         let lines = open().map_err(|error| {
@@ -174,27 +176,7 @@ impl Output {
         if saved {
             let (time, name) = (report.time_s, format!("surface_{:05}.vtp", report.frame));
             simulation.read_back()?;
-            let surface = simulation.surface();
-            let on_cut = |p: usize| simulation.on_cut().get(p).copied().unwrap_or(false);
-            let cut: Vec<f64> = surface
-                .triangles
-                .iter()
-                .map(|triangle| f64::from(u8::from(triangle.iter().all(|p| on_cut(p.index())))))
-                .collect();
-            let cells = [Field {
-                name: "cut",
-                values: Values::Scalars(&cut),
-            }];
-            let fields = Fields {
-                particles: &[],
-                cells: &cells,
-            };
-            write_vtp(
-                self.folder.join(&name),
-                &surface,
-                simulation.positions(),
-                fields,
-            )?;
+            write_surface(&self.folder.join(&name), simulation)?;
             self.surfaces.push((time, name));
         }
         if let Some(pictures) = &mut self.pictures {
@@ -216,17 +198,41 @@ impl Output {
         let cluster = |t: usize| clustering.labels()[t];
         let clusters = numbers(&|t| cluster(t).0);
         let colors = numbers(&|t| coloring.color(cluster(t).index()).0);
-        let labels = mesh.pieces().labels;
-        let pieces = numbers(&|t| labels[t]);
-        let (used, positions) = used_particles(simulation);
-        let particles = [Field {
-            name: "rest_position",
-            values: Values::Vectors(&used.positions),
-        }];
+        let pieces = scalars(simulation.piece_numbers());
+        let (used, positions, kept) = used_particles(simulation);
+        let all_velocities = simulation.velocities();
+        let velocities: Vec<DVec3> = kept.iter().map(|&p| all_velocities[p]).collect();
+        let displacements: Vec<DVec3> = positions
+            .iter()
+            .zip(&used.positions)
+            .map(|(now, rest)| *now - *rest)
+            .collect();
+        let on_cut = simulation.on_cut();
+        let cut: Vec<f64> = kept
+            .iter()
+            .map(|&p| f64::from(u8::from(on_cut.get(p).copied().unwrap_or(false))))
+            .collect();
+        let stretches: Vec<f64> = (0..mesh.tets.len())
+            .map(|t| stretch_of(simulation, t))
+            .collect();
+        let vectors = |name, values| Field {
+            name,
+            values: Values::Vectors(values),
+        };
+        let particles = [
+            vectors("rest_position", &used.positions),
+            vectors("displacement", &displacements),
+            vectors("velocity", &velocities),
+            Field {
+                name: "cut",
+                values: Values::Scalars(&cut),
+            },
+        ];
         let cells = [
             ("cluster", &clusters),
             ("color", &colors),
             ("piece", &pieces),
+            ("stretch", &stretches),
         ]
         .map(|(name, values)| Field {
             name,
@@ -244,6 +250,56 @@ impl Output {
         self.lines.into_iter().try_for_each(Lines::finish)?;
         Ok(said)
     }
+}
+
+/// Writes the surface of a frame with displacement (m) and velocity (m/s) of particles, and for each triangle whether it
+/// is a cut face, its piece and the largest stretch of its tet.
+fn write_surface(path: &Path, simulation: &Simulation) -> anyhow::Result<()> {
+    let mut surface = Surface::default();
+    let mut cut = Vec::new();
+    for triangle in simulation.boundary() {
+        surface.triangles.push(triangle.particles);
+        surface.tets.push(triangle.tet);
+        cut.push(f64::from(u8::from(matches!(triangle.tag, FaceTag::Cut(_)))));
+    }
+    let pieces = simulation.piece_numbers();
+    let pieces = scalars(surface.tets.iter().map(|tet| pieces[tet.index()]));
+    let stretches: Vec<f64> = surface
+        .tets
+        .iter()
+        .map(|tet| stretch_of(simulation, tet.index()))
+        .collect();
+    let (rest, now) = (&simulation.mesh().positions, simulation.positions());
+    let displacements: Vec<DVec3> = now.iter().zip(rest).map(|(x, rest)| *x - *rest).collect();
+    let velocities = simulation.velocities();
+    let particles =
+        [("displacement", &displacements), ("velocity", &velocities)].map(|(name, values)| Field {
+            name,
+            values: Values::Vectors(values),
+        });
+    let cells =
+        [("cut", &cut), ("piece", &pieces), ("stretch", &stretches)].map(|(name, values)| Field {
+            name,
+            values: Values::Scalars(values),
+        });
+    let fields = Fields {
+        particles: &particles,
+        cells: &cells,
+    };
+    Ok(write_vtp(path, &surface, now, fields)?)
+}
+
+/// Numbers as values of a field.
+fn scalars(numbers: impl IntoIterator<Item = u32>) -> Vec<f64> {
+    numbers.into_iter().map(f64::from).collect()
+}
+
+/// Largest principal stretch of a tet.
+fn stretch_of(simulation: &Simulation, tet: usize) -> f64 {
+    let mesh = simulation.mesh();
+    let corners = mesh.tets[tet];
+    let rest = corners.map(|p| mesh.positions[p.index()]);
+    stretch(rest, corners.map(|p| simulation.positions()[p.index()]))
 }
 
 /// Extensions that [`save_mesh`] supports.
@@ -268,7 +324,7 @@ pub(crate) fn require_mesh_file(path: &Path) -> Result<(), Failure> {
 /// Writes the rest mesh without the unused particles of removed tets. A `.vtu` file also has the deformed positions;
 /// other formats cannot store them.
 pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<()> {
-    let (mesh, positions) = used_particles(simulation);
+    let (mesh, positions, _) = used_particles(simulation);
     if path
         .extension()
         .is_some_and(|ending| ending.eq_ignore_ascii_case("vtu"))
@@ -288,15 +344,16 @@ pub(crate) fn save_mesh(path: &Path, simulation: &Simulation) -> anyhow::Result<
     Ok(())
 }
 
-/// The rest mesh without the unused particles of removed tets, and the deformed positions of its particles. Tets keep their
-/// numbers.
-fn used_particles(simulation: &Simulation) -> (TetMesh, Vec<DVec3>) {
+/// The rest mesh without the unused particles of removed tets, the deformed positions of its particles, and their numbers
+/// in the simulation. Tets keep their numbers.
+fn used_particles(simulation: &Simulation) -> (TetMesh, Vec<DVec3>, Vec<usize>) {
     let drop_unused = RepairOptions {
         drop_unused: true,
         ..RepairOptions::default()
     };
     let used = repair(simulation.mesh(), &drop_unused);
     let now = simulation.positions();
-    let positions = used.particles.iter().map(|p| now[p.index()]).collect();
-    (used.mesh, positions)
+    let kept: Vec<usize> = used.particles.iter().map(|p| p.index()).collect();
+    let positions = kept.iter().map(|&p| now[p]).collect();
+    (used.mesh, positions, kept)
 }

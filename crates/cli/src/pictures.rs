@@ -1,6 +1,7 @@
 //! [`Pictures`]: images of a run: one for each saved frame, a contact sheet and an animation.
 //!
-//! An animation has about 25 images for each second of simulated time, independent of the frames that are saved.
+//! An animation has about 25 images for each second of simulated time, or the number of `--fps`, independent of the frames
+//! that are saved. It shows the simulated time as it is: an image stands for the first frame at or after its time.
 
 use std::path::{Path, PathBuf};
 
@@ -42,8 +43,10 @@ pub(crate) struct Pictures {
     saved: bool,
     animation: Option<PathBuf>,
     writer: Option<Animation>,
-    /// Frames from one image of the animation to the next.
-    animation_every: u64,
+    /// Seconds from one image of the animation to the next.
+    image_time: f64,
+    /// Images of the animation so far.
+    images: u64,
     time_step: f64,
     /// The frames on the sheet, ascending.
     on_sheet: Vec<u64>,
@@ -65,6 +68,16 @@ impl Pictures {
         let (renderer, note) = Renderer::for_simulation(simulation);
         let render_scene = RenderScene::new(simulation, scene);
         let time_step = scene.solver.time_step;
+        let image_time = match arguments.fps {
+            Some(rate) if rate * time_step > 1.0 + 1e-9 => {
+                return Err(Failure::Input(anyhow::anyhow!(
+                    "--fps {rate}: the scene has {} frames per second (solver.time_step = {time_step}); give no more",
+                    (1e4 / time_step).round() / 1e4
+                )));
+            }
+            Some(rate) => 1.0 / rate,
+            None => animation_every(time_step) as f64 * time_step,
+        };
         Ok(Some(Self {
             renderer,
             note,
@@ -80,7 +93,8 @@ impl Pictures {
             saved: !arguments.no_pictures,
             animation: arguments.animation.clone(),
             writer: None,
-            animation_every: animation_every(time_step),
+            image_time,
+            images: 0,
             time_step,
             on_sheet: if arguments.no_pictures {
                 Vec::new()
@@ -97,8 +111,7 @@ impl Pictures {
         if let Some(path) = &self.animation {
             // The folder of the run exists by now.
             require_file(path)?;
-            let seconds = self.animation_every as f64 * self.time_step;
-            self.writer = Some(Animation::create(path, self.size, seconds)?);
+            self.writer = Some(Animation::create(path, self.size, self.image_time)?);
         }
         Ok(())
     }
@@ -114,7 +127,8 @@ impl Pictures {
         self.render_scene.sync(simulation);
         let frame = simulation.report().frame;
         let saved = saved && self.saved;
-        let animated = self.writer.is_some() && frame.is_multiple_of(self.animation_every);
+        let animated =
+            self.writer.is_some() && is_due(frame, self.time_step, self.images, self.image_time);
         if !(saved || animated) {
             return Ok(());
         }
@@ -125,6 +139,7 @@ impl Pictures {
         }
         if let Some(animation) = self.writer.as_mut().filter(|_| animated) {
             animation.push(&picture)?;
+            self.images += 1;
         }
         if saved && self.on_sheet.binary_search(&frame).is_ok() {
             let report = simulation.report();
@@ -208,6 +223,12 @@ fn camera(
     camera
 }
 
+/// True if a frame is at or after the time of an image, up to rounding.
+fn is_due(frame: u64, time_step: f64, image: u64, image_time: f64) -> bool {
+    let (now, wanted) = (frame as f64 * time_step, image as f64 * image_time);
+    now >= wanted - 1e-9 * time_step.max(wanted)
+}
+
 /// Frames from one image of an animation to the next.
 #[expect(
     clippy::cast_possible_truncation,
@@ -253,6 +274,35 @@ mod tests {
             );
             let kept = |f: &u64| f.is_multiple_of(save_every(frames)) || f + 1 == frames;
             assert!(sheet.iter().all(kept), "{frames}: {sheet:?}");
+        }
+    }
+
+    /// The number of images is that of a clock of this rate, and each is at most a frame late.
+    #[test]
+    fn images_keep_their_rate() {
+        for (time_step, rate) in [
+            (0.016, 30.0),
+            (0.01, 50.0),
+            (0.016, 62.5),
+            (0.001, 24.0),
+            (0.02, 0.7),
+        ] {
+            let mut images = 0;
+            for frame in 0..20_000_u64 {
+                if is_due(frame, time_step, images, 1.0 / rate) {
+                    let late = frame as f64 * time_step - images as f64 / rate;
+                    assert!(
+                        (-1e-6..time_step).contains(&late),
+                        "{time_step} {rate}: {late}"
+                    );
+                    images += 1;
+                }
+            }
+            let expected = 19_999.0 * time_step * rate;
+            assert!(
+                (images as f64 - expected).abs() <= 1.0 + 1e-6,
+                "{images} {expected}"
+            );
         }
     }
 

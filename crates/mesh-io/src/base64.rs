@@ -1,4 +1,4 @@
-//! Encoding of bytes as base64, for text formats.
+//! Bytes as base64 and back, for text formats.
 //!
 //! Source: RFC 4648, section 4. Linear.
 
@@ -15,6 +15,48 @@ pub(crate) fn base64(out: &mut dyn Write, bytes: &[u8]) -> io::Result<()> {
         out.write_all(&digits)?;
     }
     Ok(())
+}
+
+/// The next four digits, without blanks and line ends.
+pub(crate) fn next_group(text: &mut &[u8]) -> Option<[u8; 4]> {
+    let mut group = [0; 4];
+    let mut found = 0;
+    while found < 4 {
+        let (&byte, rest) = text.split_first()?;
+        *text = rest;
+        if !byte.is_ascii_whitespace() {
+            group[found] = byte;
+            found += 1;
+        }
+    }
+    Some(group)
+}
+
+/// Four digits as up to three bytes.
+pub(crate) fn decode(group: [u8; 4]) -> Option<([u8; 3], usize)> {
+    let padding = group
+        .iter()
+        .rev()
+        .take_while(|&&digit| digit == b'=')
+        .count();
+    if padding > 2 {
+        return None;
+    }
+    let mut bits = 0_u32;
+    for &digit in &group[..4 - padding] {
+        let value = match digit {
+            b'A'..=b'Z' => digit - b'A',
+            b'a'..=b'z' => digit - b'a' + 26,
+            b'0'..=b'9' => digit - b'0' + 52,
+            b'+' => 62,
+            b'/' => 63,
+            _ => return None,
+        };
+        bits = bits << 6 | u32::from(value);
+    }
+    bits <<= 6 * padding;
+    let [_, a, b, c] = bits.to_be_bytes();
+    Some(([a, b, c], 3 - padding))
 }
 
 #[cfg(test)]
@@ -34,6 +76,13 @@ mod tests {
             let mut out = Vec::new();
             base64(&mut out, plain.as_bytes()).unwrap();
             assert_eq!(out, encoded.as_bytes());
+            let mut text = encoded.as_bytes();
+            let mut back: Vec<u8> = Vec::new();
+            while let Some(group) = next_group(&mut text) {
+                let (bytes, count) = decode(group).unwrap();
+                back.extend(&bytes[..count]);
+            }
+            assert_eq!(back, plain.as_bytes());
         }
     }
 }

@@ -14,6 +14,32 @@ pub(crate) fn unsupported_format(path: &Path, known: &'static str) -> MeshIoErro
     }
 }
 
+/// Endings of mesh files that are read and written.
+pub(crate) const MESHES: &str = ".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb";
+
+/// Endings of surface files that are read and written.
+pub(crate) const SURFACES: &str = ".obj, .stl, .ply, .off, .glb, .gltf";
+
+/// The error for a file to be read that is no mesh.
+pub(crate) fn no_mesh(path: &Path, known: &'static str) -> MeshIoError {
+    match is_among(path, SURFACES) {
+        true => MeshIoError::Surface {
+            path: path.to_owned(),
+        },
+        false => unsupported_format(path, known),
+    }
+}
+
+/// The error for a file to be read that is no surface.
+pub(crate) fn no_surface(path: &Path) -> MeshIoError {
+    match is_among(path, MESHES) {
+        true => MeshIoError::Tets {
+            path: path.to_owned(),
+        },
+        false => unsupported_format(path, SURFACES),
+    }
+}
+
 /// The Cargo feature of the format with an ending.
 fn feature(ending: &str) -> Option<&'static str> {
     Some(match ending {

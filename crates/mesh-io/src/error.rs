@@ -44,6 +44,15 @@ pub enum MeshIoError {
         message: String,
     },
 
+    /// A file of nested content that violates its format; the message names the place, such as `meshes[2]`.
+    #[error("{}: {message}", path.display())]
+    ParseContent {
+        /// The file.
+        path: PathBuf,
+        /// The content that was found and the expected one.
+        message: String,
+    },
+
     /// A file whose ending is not that of a supported format.
     #[error("cannot tell the format of {}: use one of the endings {known}", path.display())]
     UnknownFormat {
@@ -51,6 +60,28 @@ pub enum MeshIoError {
         path: PathBuf,
         /// The supported endings, separated by commas.
         known: &'static str,
+    },
+
+    /// A surface of triangles where a mesh of tets is needed.
+    #[error(
+        "{} is a surface of triangles, not a mesh of tets: fill it by `incise mesh tetrahedralize` (in a program by \
+         incise_meshing::tetrahedralize)",
+        path.display()
+    )]
+    Surface {
+        /// The file.
+        path: PathBuf,
+    },
+
+    /// A mesh of tets where a surface of triangles is needed.
+    #[error(
+        "{} is a mesh of tets, not a surface: `incise mesh convert` writes its boundary (in a program \
+         incise_mesh::TriangleSurface::boundary_of)",
+        path.display()
+    )]
+    Tets {
+        /// The file.
+        path: PathBuf,
     },
 
     /// A file of a format that is left out of this build.

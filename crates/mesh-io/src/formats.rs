@@ -7,7 +7,7 @@ use std::path::Path;
 
 use incise_mesh::TetMesh;
 
-use crate::endings::{ending, unsupported_format};
+use crate::endings::{MESHES, ending, is_among, no_mesh, unsupported_format};
 #[cfg(feature = "medit")]
 use crate::medit::{read_medit, write_medit};
 #[cfg(feature = "msh")]
@@ -20,8 +20,11 @@ use crate::vtk::{read_vtk, read_vtk_file, write_vtk, write_vtk_file};
 use crate::vtu::{read_vtu, write_vtu, write_vtu_file};
 use crate::{MeshFile, MeshIoError};
 
-/// The endings of mesh files that are read and written.
-const KNOWN: &str = ".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb";
+/// True if [`read`] and [`write`] support the ending of the file name.
+#[must_use]
+pub fn is_mesh(path: &Path) -> bool {
+    is_among(path, MESHES)
+}
 
 /// Reads a mesh with its regions and values, in the format of the file's ending; for a `.node`/`.ele` pair either name
 /// is accepted.
@@ -30,8 +33,8 @@ const KNOWN: &str = ".vtk, .vtu, .msh, .node, .ele, .mesh, .meshb";
 /// finite coordinates; [`TetMesh::check`] checks all other rules.
 ///
 /// # Errors
-/// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::FormatLeftOut`] for a format that this build
-/// lacks, [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] or [`MeshIoError::ParseBytes`] if its
+/// [`MeshIoError::UnknownFormat`] for another ending, [`MeshIoError::Surface`] for that of a surface,
+/// [`MeshIoError::FormatLeftOut`] for a format that this build lacks, [`MeshIoError::Io`] if the file cannot be read, [`MeshIoError::Parse`] or [`MeshIoError::ParseBytes`] if its
 /// content is wrong or has volumes other than tets, [`MeshIoError::Empty`] if it has no cells.
 pub fn read_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
     let path = path.as_ref();
@@ -46,7 +49,7 @@ pub fn read_file(path: impl AsRef<Path>) -> Result<MeshFile, MeshIoError> {
         "node" | "ele" => read_tetgen_file(path),
         #[cfg(feature = "medit")]
         "mesh" | "meshb" => read_medit(path),
-        _ => Err(unsupported_format(path, KNOWN)),
+        _ => Err(no_mesh(path, MESHES)),
     }
 }
 
@@ -75,7 +78,7 @@ pub fn parse_file(path: impl AsRef<Path>, bytes: &[u8]) -> Result<MeshFile, Mesh
         "msh" => crate::msh::parse_msh(bytes, path),
         #[cfg(feature = "medit")]
         "mesh" | "meshb" => crate::medit::parse_medit(bytes, path),
-        _ => Err(unsupported_format(path, ".vtk, .vtu, .msh, .mesh, .meshb")),
+        _ => Err(no_mesh(path, ".vtk, .vtu, .msh, .mesh, .meshb")),
     }
 }
 
@@ -130,7 +133,7 @@ pub fn write_file(path: impl AsRef<Path>, file: &MeshFile) -> Result<(), MeshIoE
         "node" | "ele" => write_tetgen_file(path, file),
         #[cfg(feature = "medit")]
         "mesh" | "meshb" => write_medit(path, file),
-        _ => Err(unsupported_format(path, KNOWN)),
+        _ => Err(unsupported_format(path, MESHES)),
     }
 }
 
@@ -158,16 +161,18 @@ mod tests {
     /// In a build without formats the error of each ending names its feature; other endings stay unknown.
     #[test]
     fn formats_that_are_left_out_name_their_feature() {
-        for known in KNOWN.split(", ") {
-            let error = unsupported_format(Path::new(&format!("a{known}")), KNOWN);
+        for known in MESHES.split(", ") {
+            let error = unsupported_format(Path::new(&format!("a{known}")), MESHES);
             assert!(
                 matches!(error, MeshIoError::FormatLeftOut { .. }),
                 "{error}"
             );
         }
-        let error = unsupported_format(Path::new("a.meshb"), KNOWN);
+        let error = unsupported_format(Path::new("a.meshb"), MESHES);
         assert!(error.to_string().contains("\"medit\""), "{error}");
-        let error = unsupported_format(Path::new("a.obj"), KNOWN);
+        let error = unsupported_format(Path::new("a.obj"), MESHES);
         assert!(matches!(error, MeshIoError::UnknownFormat { .. }));
+        let error = read(Path::new("a.obj")).unwrap_err();
+        assert!(error.to_string().contains("tetrahedralize"), "{error}");
     }
 }

@@ -9,8 +9,8 @@
 //! | `.msh` | `msh` | Gmsh 1, 2 and 4.1, text and binary | yes | 4.1 and 2.2 ([`write_msh`]) | regions (physical groups, without their names), scalars, vectors |
 //! | `.node`, `.ele` | `tetgen` | TetGen, a pair of files | yes | yes | regions, up to 256 attributes, markers |
 //! | `.mesh`, `.meshb` | `medit` | Medit, text and binary | yes | yes | regions (references), references of points |
-//! | `.obj`, `.off`, `.ply`, `.stl` | `obj`, `off`, `ply`, `stl` | triangle surfaces | [`read_surface`] | [`write_surface`], [`write_ply`], [`write_stl_binary`] | |
-//! | `.glb`, `.gltf` | `gltf` | glTF 2.0 surface for viewers | | [`write_surface`], rounded to floats | normals |
+//! | `.obj`, `.off`, `.ply`, `.stl` | `obj`, `off`, `ply`, `stl` | triangle surfaces | [`read_surface`] | [`write_surface`], [`write_ply`], [`write_stl_binary`] | `.obj`: texture coordinates ([`SurfaceFile`]) |
+//! | `.glb`, `.gltf` | `gltf` | glTF 2.0 | [`read_surface`], the triangles of the scene | [`write_surface`], rounded to floats | texture coordinates; written: normals |
 //! | `.vtp` | `vtu` | VTK XML surface with fields | | [`write_vtp`] | scalars, vectors |
 //! | `.pvd` | `vtu` | ParaView collection of time steps | | [`write_pvd`] | |
 //!
@@ -52,9 +52,10 @@
 //! file could fill, never panic, and report file and line of an error. A file is written under a temporary name and
 //! renamed when complete. Time and memory are linear in the size of the file.
 //!
-//! Reading takes at most ten times the size of a usual file as memory, and 20 times that of any file, with two
-//! exceptions: 64 times for fields of single bits in VTK files, since each becomes a double; and for a compressed
-//! `.vtu` five times its decompressed size, which is bounded by its counts and can be 1032 times the compressed size.
+//! Reading takes at most ten times the size of a usual file as memory, and 20 times that of any file, with three
+//! exceptions: 64 times for fields of single bits in VTK files, since each becomes a double; for a compressed
+//! `.vtu` five times its decompressed size, which is bounded by its counts and can be 1032 times the compressed size; and
+//! for glTF up to 500 times the size of its text, where empty objects of three bytes become structures.
 
 // With some formats only, parts of the shared code are unused.
 #![cfg_attr(
@@ -91,6 +92,7 @@ mod polygon;
 mod pvd;
 #[cfg(feature = "stl")]
 mod stl;
+mod surface_file;
 mod surfaces;
 #[cfg(test)]
 mod test_files;
@@ -115,7 +117,7 @@ pub use atomic::write_atomically;
 pub use error::MeshIoError;
 pub use fields::{Field, Fields, Values};
 pub use file::{MeshFile, NamedValues, OwnedValues};
-pub use formats::{parse_file, read, read_file, write, write_file};
+pub use formats::{is_mesh, parse_file, read, read_file, write, write_file};
 #[cfg(feature = "medit")]
 pub use medit::{read_medit, write_medit};
 #[cfg(feature = "msh")]
@@ -126,7 +128,11 @@ pub use ply::{PlyEncoding, write_ply};
 pub use pvd::write_pvd;
 #[cfg(feature = "stl")]
 pub use stl::write_stl_binary;
-pub use surfaces::{is_surface, parse_surface, read_surface, write_surface};
+pub use surface_file::SurfaceFile;
+pub use surfaces::{
+    is_surface, parse_surface, parse_surface_file, read_surface, read_surface_file, write_surface,
+    write_surface_file,
+};
 #[cfg(feature = "tetgen")]
 pub use tetgen::{parse_tetgen, read_tetgen, read_tetgen_file, write_tetgen, write_tetgen_file};
 #[cfg(feature = "vtk")]

@@ -1,25 +1,36 @@
-//! Wavefront `.obj`: `v` lines with positions and `f` lines with polygons.
+//! Wavefront `.obj`: `v` lines with positions, `vt` lines with texture coordinates and `f` lines with polygons.
 //!
-//! Corners count from 1, or backwards from the last point if negative; the part after a slash (texture, normal) is
-//! skipped, and so are all other statements. A backslash continues a line. Source: "Object Files (.obj)", Advanced
+//! Corners count from 1, or backwards from the last point if negative; a number of texture coordinates may follow after a
+//! slash, and that of a normal, which is skipped, and so are all other statements. Texture coordinates are kept if all
+//! corners have some that exist. A backslash continues a line. Source: "Object Files (.obj)", Advanced
 //! Visualizer manual, appendix B1 (Wavefront). Linear.
 
 use std::io::{self, Write};
 use std::path::Path;
 
-use incise_mesh::{ParticleId, TriangleSurface};
+use glam::DVec2;
+use incise_mesh::ParticleId;
 
-use crate::MeshIoError;
 use crate::polygon::fan;
 use crate::text::{Text, Word, show, without_comment, words_of};
+use crate::{MeshIoError, SurfaceFile};
 
-pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Result<()> {
-    for p in &surface.positions {
+pub(super) fn write(out: &mut dyn Write, file: &SurfaceFile) -> io::Result<()> {
+    let has_texture = file.texture_corners.len() == file.surface.triangles.len();
+    for p in &file.surface.positions {
         writeln!(out, "v {:?} {:?} {:?}", p.x, p.y, p.z)?;
     }
-    for triangle in &surface.triangles {
+    for pair in file.texture.iter().filter(|_| has_texture) {
+        writeln!(out, "vt {:?} {:?}", pair.x, pair.y)?;
+    }
+    for (t, triangle) in file.surface.triangles.iter().enumerate() {
         let [a, b, c] = triangle.map(|p| u64::from(p.0) + 1);
-        writeln!(out, "f {a} {b} {c}")?;
+        if has_texture {
+            let [i, j, k] = file.texture_corners[t].map(|corner| u64::from(corner) + 1);
+            writeln!(out, "f {a}/{i} {b}/{j} {c}/{k}")?;
+        } else {
+            writeln!(out, "f {a} {b} {c}")?;
+        }
     }
     Ok(())
 }
@@ -29,20 +40,25 @@ pub(super) fn write(out: &mut dyn Write, surface: &TriangleSurface) -> io::Resul
 enum Statement {
     None,
     Point,
+    Texture,
     Face,
     Other,
 }
 
-pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, MeshIoError> {
+pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<SurfaceFile, MeshIoError> {
     let text = Text::new(path, bytes);
-    let mut surface = TriangleSurface::default();
+    let mut file = SurfaceFile::default();
+    let surface = &mut file.surface;
     // The largest corner and its line: points may come after the polygons.
     let mut largest: Option<(ParticleId, usize)> = None;
+    let mut largest_texture: Option<ParticleId> = None;
     let mut statement = Statement::None;
     let mut coordinates = [0.0; 3];
     // The number of words of the statement after the keyword.
     let mut length = 0;
     let mut polygon = Vec::new();
+    let mut texture_polygon = Vec::new();
+    let mut texture_triangles = Vec::new();
     let mut last_line = 1;
     for (line, content) in text.lines(1) {
         last_line = line;
@@ -54,6 +70,7 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                 Statement::None => {
                     statement = match word.text {
                         b"v" => Statement::Point,
+                        b"vt" => Statement::Texture,
                         b"f" => Statement::Face,
                         _ => Statement::Other,
                     };
@@ -61,6 +78,7 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                 }
                 // A weight or a color may follow.
                 Statement::Point if length < 3 => coordinates[length] = text.coordinate(word)?,
+                Statement::Texture if length < 2 => coordinates[length] = text.coordinate(word)?,
                 Statement::Face => {
                     let corner = corner(word, surface.positions.len()).ok_or_else(|| {
                         let message = format!(
@@ -74,8 +92,12 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
                         largest = Some((corner, word.line));
                     }
                     polygon.push(corner);
+                    if let Some(corner) = texture_corner(word, file.texture.len()) {
+                        largest_texture = largest_texture.max(Some(corner));
+                        texture_polygon.push(corner);
+                    }
                 }
-                Statement::Point | Statement::Other => {}
+                Statement::Point | Statement::Texture | Statement::Other => {}
             }
             length += 1;
         }
@@ -90,36 +112,65 @@ pub(crate) fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, Me
             Statement::Face if length < 3 => {
                 return Err(text.error(line, "a face has less than 3 corners"));
             }
-            Statement::Face => fan(&polygon, &mut surface.triangles),
+            Statement::Texture => {
+                // Without a second coordinate the texture is a line.
+                let v = if length < 2 { 0.0 } else { coordinates[1] };
+                file.texture.push(DVec2::new(coordinates[0], v));
+            }
+            Statement::Face => {
+                fan(&polygon, &mut surface.triangles);
+                if texture_polygon.len() == polygon.len() {
+                    fan(&texture_polygon, &mut texture_triangles);
+                }
+            }
             Statement::None | Statement::Other => {}
         }
         statement = Statement::None;
         length = 0;
         polygon.clear();
+        texture_polygon.clear();
     }
     if statement != Statement::None {
         return Err(text.ends_early("the rest of a continued line"));
     }
-    match largest {
-        Some((corner, line)) if corner.index() >= surface.positions.len() => {
-            let message = format!(
-                "a face has the point {} but there are {}, counted from 1",
-                corner.index() + 1,
-                surface.positions.len()
-            );
-            Err(text.error(line, message))
-        }
-        Some(_) => Ok(surface),
-        None => Err(text.error(last_line, "the file has no faces")),
+    let Some((corner, line)) = largest else {
+        return Err(text.error(last_line, "the file has no faces"));
+    };
+    if corner.index() >= surface.positions.len() {
+        let message = format!(
+            "a face has the point {} but there are {}, counted from 1",
+            corner.index() + 1,
+            surface.positions.len()
+        );
+        return Err(text.error(line, message));
     }
+    let all_have_texture = texture_triangles.len() == surface.triangles.len();
+    if all_have_texture && largest_texture.is_some_and(|t| t.index() < file.texture.len()) {
+        file.texture_corners = texture_triangles
+            .into_iter()
+            .map(|triangle: [ParticleId; 3]| triangle.map(|corner| corner.0))
+            .collect();
+    } else {
+        file.texture = Vec::new();
+    }
+    Ok(file)
 }
 
 /// The particle of a word like `3`, `3/1`, `3//2` or `-1/2/3` after this many points.
 fn corner(word: Word<'_>, points: usize) -> Option<ParticleId> {
-    let number = word.text.split(|&b| b == b'/').next()?;
-    let number: i64 = str::from_utf8(number).ok()?.parse().ok()?;
+    numbered(word.text.split(|&b| b == b'/').next()?, points)
+}
+
+/// The texture coordinates of a word like `3/1` or `-1/2/3` after this many of them; `None` if it has none.
+fn texture_corner(word: Word<'_>, count: usize) -> Option<ParticleId> {
+    numbered(word.text.split(|&b| b == b'/').nth(1)?, count)
+}
+
+/// An element by its number from 1, or backwards from the last of `count` if negative.
+fn numbered(text: &[u8], count: usize) -> Option<ParticleId> {
+    let number: i64 = str::from_utf8(text).ok()?.parse().ok()?;
     let index = if number < 0 {
-        i64::try_from(points).ok()?.checked_add(number)?
+        i64::try_from(count).ok()?.checked_add(number)?
     } else {
         number - 1
     };

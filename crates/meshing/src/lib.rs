@@ -54,7 +54,7 @@ pub use search::generate;
 pub use shapes::Shape;
 pub use solid::{Prepared, Solid};
 pub use stuffing::{stuff, stuff_graded};
-pub use tetrahedralize::tetrahedralize;
+pub use tetrahedralize::{Attempt, tetrahedralize, tetrahedralize_with};
 
 /// Compiles the example of the README.
 #[cfg(doctest)]

@@ -75,9 +75,11 @@ fn search(
         tets,
         volume: shape.volume(),
         levels: 0,
+        smallest_step: 1e-4,
     };
     let distance = |p| shape.signed_distance(turn * p);
-    let Some((grid, count)) = find_grid(half, shift, &wanted, &distance)? else {
+    let found = find_grid(half, shift, &wanted, &distance, &mut |_, _| {})?;
+    let Search::Grid(grid, count) = found else {
         return Ok(None);
     };
     let mut mesh = grid.extract(count);
@@ -95,33 +97,53 @@ pub(super) struct Wanted {
     pub(super) volume: f64,
     /// Largest number of times inner cells are merged into larger ones.
     pub(super) levels: u32,
+    /// Relative difference of two spacings between which a change of the number is taken for a jump.
+    pub(super) smallest_step: f64,
+}
+
+/// Result of a search.
+pub(super) enum Search {
+    /// A lattice with its number of tets.
+    Grid(Box<Grid>, usize),
+    /// The number jumps over the wanted one: the nearest ones below and above that were found.
+    Jump([usize; 2]),
 }
 
 /// Searches a spacing that gives the requested number of tets to within 2 %, in a box around the origin. The slope of
-/// `distance` is at most one.
+/// `distance` is at most one. `tried` gets each spacing with its number of tets.
 pub(super) fn find_grid(
     half: DVec3,
     shift: DVec3,
     wanted: &Wanted,
     distance: &(impl Fn(DVec3) -> f64 + Sync),
-) -> Result<Option<(Grid, usize)>, MeshingError> {
+    tried: &mut dyn FnMut(f64, usize),
+) -> Result<Search, MeshingError> {
     let &Wanted {
         tets,
         volume,
         levels,
+        smallest_step,
     } = wanted;
     let (mut fine, mut coarse) = (0.0, f64::INFINITY);
+    let [mut below, mut above] = [0, usize::MAX];
     let mut spacing = cube_root(12.0 * volume / tets as f64);
     for _ in 0..SPACINGS {
         let lattice = Lattice::covering(-half, half, spacing, shift)?;
         let mut grid = Grid::new(&lattice, Slope::AtMostOne, distance)?;
         grid.coarsen(levels);
         let count = grid.tet_count();
+        tried(spacing, count);
         if 50 * count.abs_diff(tets) <= tets {
-            return Ok(Some((grid, count)));
+            return Ok(Search::Grid(Box::new(grid), count));
         }
-        *(if count > tets { &mut fine } else { &mut coarse }) = spacing;
-        if coarse - fine < 1e-4 * spacing {
+        if count > tets {
+            fine = spacing;
+            above = above.min(count);
+        } else {
+            coarse = spacing;
+            below = below.max(count);
+        }
+        if coarse - fine < smallest_step * spacing {
             break;
         }
         let guess = spacing * cube_root(count.max(1) as f64 / tets as f64).clamp(0.7, 1.4);
@@ -131,7 +153,7 @@ pub(super) fn find_grid(
             0.5 * (fine + coarse)
         };
     }
-    Ok(None)
+    Ok(Search::Jump([below, above]))
 }
 
 /// True if a mesh has the topology of the shape, which a coarse lattice can change, and good angles.

@@ -8,21 +8,49 @@
 //! there. If it still touches itself along an edge, or has more pieces than the surface has shells, another shift of
 //! the lattice is tried.
 //!
+//! The mean thickness of a body is 2 V / A for its volume V and surface area A; for a plate it is the thickness. Two
+//! layers of lattice vertices lie inside a plate of any direction if it is about a spacing thick. Coarser lattices tear
+//! it or give nothing, which is an error with the number of tets that is needed, in the clear cases before any search.
+//!
 //! Cost: some three to ten stuffings, six times as many where thin parts tear, each with two samples per cell of the
 //! bounding box at O(log n) for n triangles.
 
 use glam::{DMat3, DVec3};
 use incise_mesh::TetMesh;
 
-use crate::search::{Wanted, cube_root, find_grid, shift, turned};
+use crate::search::{Search, Wanted, cube_root, find_grid, shift, turned};
 use crate::{MeshingError, Solid};
 
 /// Distance up to which distances are computed exactly, in cube roots of the mean tet volume.
 const REACH: f64 = 16.0;
 /// Number of lattice shifts that are tried, aligned and rotated.
 const SHIFTS: u32 = 6;
+/// Number of misses after which a body that is thin for its tets gets no further shift: they change little there.
+const MISSES_IF_THIN: u32 = 2;
 /// Range of the number of tets.
 const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
+/// Largest spacing in mean thicknesses.
+const COARSEST: f64 = 2.0;
+/// Spacing in mean thicknesses from which a body is thin for its tets.
+const THIN: f64 = 0.5;
+/// Spacing in mean thicknesses that a refusal recommends.
+const RECOMMENDED: f64 = 0.75;
+/// Part of the volume below which a torn body is refused.
+const SMALLEST_PART: f64 = 0.8;
+
+/// A lattice that was tried by [`tetrahedralize_with`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub struct Attempt {
+    /// Number of the lattice, from 0.
+    pub lattice: u32,
+    /// Largest number of lattices.
+    pub lattices: u32,
+    /// Spacing of the lattice in meters.
+    pub spacing: f64,
+    /// Number of tets that it gives.
+    pub tets: usize,
+}
 
 /// Fills a solid with `tets` tets to within 2 %.
 ///
@@ -34,9 +62,10 @@ const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 /// Bit-identical on every platform.
 ///
 /// # Errors
-/// [`MeshingError::Surface`] if fewer than 100 or more than four million tets are requested, or if no lattice gives
-/// that number and a body that does not touch itself: thin parts need more tets. [`MeshingError::Lattice`] if the
-/// bounding box of the solid has too many cells, as for a thin body along the diagonal of its box.
+/// [`MeshingError::Surface`] if fewer than 100 or more than four million tets are requested; if the tets would be more
+/// than twice as large as the body is thick, which names the number that is needed; or if no lattice gives that number
+/// and a body that does not touch itself. [`MeshingError::Lattice`] if the bounding box of the solid has too many cells,
+/// as for a thin body along the diagonal of its box.
 ///
 /// # Example
 /// ```
@@ -53,6 +82,31 @@ const TETS: std::ops::RangeInclusive<usize> = 100..=4_000_000;
 /// # Ok::<(), incise_meshing::MeshingError>(())
 /// ```
 pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh, MeshingError> {
+    tetrahedralize_with(solid, tets, levels, &mut |_| {})
+}
+
+/// Fills a solid like [`tetrahedralize`] and calls `tried` after each lattice, for a progress bar.
+///
+/// # Errors
+/// The errors of [`tetrahedralize`].
+///
+/// # Example
+/// ```
+/// use incise_mesh::{TriangleSurface, glam::DVec3, kuhn_box};
+/// use incise_meshing::{Solid, tetrahedralize_with};
+///
+/// let cube = TriangleSurface::boundary_of(&kuhn_box([1, 1, 1], DVec3::ONE));
+/// let mut last = 0;
+/// let mesh = tetrahedralize_with(&Solid::new(&cube)?, 500, 0, &mut |attempt| last = attempt.tets)?;
+/// assert_eq!(mesh.tets.len(), last);
+/// # Ok::<(), incise_meshing::MeshingError>(())
+/// ```
+pub fn tetrahedralize_with(
+    solid: &Solid,
+    tets: usize,
+    levels: u32,
+    tried: &mut dyn FnMut(&Attempt),
+) -> Result<TetMesh, MeshingError> {
     if !TETS.contains(&tets) {
         return Err(MeshingError::Surface(format!(
             "{tets} tets were asked for, ask for {} to {}",
@@ -60,16 +114,51 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
             TETS.end()
         )));
     }
-    let mut touching = false;
-    for turn in [DMat3::IDENTITY, turned()] {
+    let thickness = 2.0 * solid.volume() / solid.area();
+    let spacing = cube_root(12.0 * solid.volume() / tets as f64);
+    let needed = rounded_up(12.0 * solid.volume() / (RECOMMENDED * thickness).powi(3));
+    let refuse = |why: String, otherwise: String| {
+        let advice = match needed > tets {
+            true => format!("ask for {needed} tets or more"),
+            false => otherwise,
+        };
+        Err(MeshingError::Surface(format!(
+            "the body is about {thickness:.2e} m thick, and {why}: {advice}"
+        )))
+    };
+    let more = || format!("ask for {} or more", rounded_up(1.5 * tets as f64));
+    if spacing > COARSEST * thickness {
+        return refuse(
+            format!("{tets} tets would be {spacing:.2e} m large"),
+            more(),
+        );
+    }
+    let is_thin = spacing > THIN * thickness;
+    let (mut touching, mut jump) = (false, None);
+    for (turn, first) in [(DMat3::IDENTITY, 0), (turned(), SHIFTS)] {
         // Thin parts tear on some lattice shifts and not on others; the first result with the fewest pieces is kept.
         let mut disconnected: Option<(usize, TetMesh)> = None;
+        let mut misses = 0;
         for n in 0..SHIFTS {
-            match search(solid, tets, levels, turn, shift(n))? {
+            if is_thin && misses == MISSES_IF_THIN {
+                break;
+            }
+            let mut tried = |spacing, tets| {
+                tried(&Attempt {
+                    lattice: first + n,
+                    lattices: 2 * SHIFTS,
+                    spacing,
+                    tets,
+                });
+            };
+            match search(solid, tets, levels, turn, shift(n), &mut tried)? {
                 Found::Mesh(mesh) => {
                     let pieces = mesh.pieces().count;
                     if pieces <= solid.prepared().shells {
                         return Ok(mesh);
+                    }
+                    if mesh.total_volume() < SMALLEST_PART * solid.volume() {
+                        misses += 1;
                     }
                     if disconnected
                         .as_ref()
@@ -79,24 +168,62 @@ pub fn tetrahedralize(solid: &Solid, tets: usize, levels: u32) -> Result<TetMesh
                     }
                 }
                 Found::TouchesItself => touching = true,
-                Found::Nothing => {}
+                Found::Jump(numbers) => {
+                    jump = jump.or(Some(numbers));
+                    misses += 1;
+                }
             }
         }
-        if let Some((_, mesh)) = disconnected {
+        if let Some((pieces, mesh)) = disconnected {
+            if mesh.total_volume() < SMALLEST_PART * solid.volume() {
+                return refuse(
+                    format!("with {tets} tets it is torn into {pieces} pieces"),
+                    more(),
+                );
+            }
             return Ok(mesh);
         }
     }
-    Err(MeshingError::Surface(if touching {
-        format!("with {tets} tets the body touches itself along edges, ask for more")
-    } else {
-        format!("no spacing gives {tets} tets to within 2 %, ask for another number")
-    }))
+    if touching {
+        return refuse(
+            format!("with {tets} tets it touches itself along edges"),
+            more(),
+        );
+    }
+    // No number above is known if none was reached by the spacings that were tried.
+    let (nearest, otherwise) = match jump {
+        Some([below, above]) if TETS.contains(&above) => (
+            format!(" (nearest numbers: {below} and {above})"),
+            format!("ask for {above}"),
+        ),
+        _ => (String::new(), more()),
+    };
+    refuse(
+        format!("no lattice gives {tets} tets to within 2 %{nearest}"),
+        otherwise,
+    )
+}
+
+/// A number of tets, rounded up to two digits and within the range.
+fn rounded_up(tets: f64) -> usize {
+    let mut unit = 1.0;
+    while tets / unit > 100.0 {
+        unit *= 10.0;
+    }
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "positive, and too large numbers saturate"
+    )]
+    let rounded = ((tets / unit).ceil() * unit) as usize;
+    rounded.clamp(*TETS.start(), *TETS.end())
 }
 
 enum Found {
     Mesh(TetMesh),
     TouchesItself,
-    Nothing,
+    /// The nearest numbers of tets below and above.
+    Jump([usize; 2]),
 }
 
 /// Fills the solid on a lattice with a given rotation and shift.
@@ -106,6 +233,7 @@ fn search(
     levels: u32,
     turn: DMat3,
     shift: DVec3,
+    tried: &mut dyn FnMut(f64, usize),
 ) -> Result<Found, MeshingError> {
     let center = solid.low().midpoint(solid.high());
     // Bounding box of the solid along the axes of the lattice.
@@ -115,12 +243,14 @@ fn search(
         tets,
         volume: solid.volume(),
         levels,
+        smallest_step: 1e-3,
     };
     // A larger reach saves samples, but makes each distance query slower.
     let reach = REACH * cube_root(solid.volume() / tets as f64);
     let distance = |p| solid.signed_distance_within(place(p), reach);
-    let Some((grid, count)) = find_grid(half, shift, &wanted, &distance)? else {
-        return Ok(Found::Nothing);
+    let (grid, count) = match find_grid(half, shift, &wanted, &distance, tried)? {
+        Search::Grid(grid, count) => (grid, count),
+        Search::Jump(numbers) => return Ok(Found::Jump(numbers)),
     };
     let mut mesh = grid.extract(count);
     drop(grid);

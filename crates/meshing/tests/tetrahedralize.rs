@@ -6,9 +6,11 @@
     reason = "helpers of tests stop at the first surprise"
 )]
 
-use incise_mesh::glam::{DVec3, dvec3};
+use incise_mesh::glam::{DQuat, DVec3, dvec3};
 use incise_mesh::{ParticleId, TetMesh, TriangleSurface, kuhn_box};
-use incise_meshing::{Lattice, MeshingError, Shape, Solid, generate, stuff, tetrahedralize};
+use incise_meshing::{
+    Lattice, MeshingError, Shape, Solid, generate, stuff, tetrahedralize, tetrahedralize_with,
+};
 use proptest::prelude::*;
 
 fn cube() -> TriangleSurface {
@@ -351,4 +353,61 @@ fn shells_are_counted_and_torn_bodies_have_the_fewest_pieces() {
     let ball = TriangleSurface::boundary_of(&generate(Shape::Sphere, 300).unwrap());
     let two = together(ball.clone(), &moved(ball, DVec3::X * 2.0));
     assert_eq!(Solid::new(&two).unwrap().prepared().shells, 2);
+}
+
+/// The number that a refusal recommends.
+fn recommended(solid: &Solid, tets: usize) -> usize {
+    let message = tetrahedralize(solid, tets, 0).unwrap_err().to_string();
+    let number = message.split("ask for ").nth(1).unwrap();
+    number.split(' ').next().unwrap().parse().unwrap()
+}
+
+/// A plate along the axes, one across them, and the wall of a hollow ball: too few tets are refused before any is made,
+/// and the number that the refusal names gives one sound piece.
+#[test]
+fn thin_bodies_are_refused_with_a_number_that_works() {
+    let plate = TriangleSurface::boundary_of(&kuhn_box([1, 1, 1], dvec3(1.0, 1.0, 0.03)));
+    let mut oblique = plate.clone();
+    let turn = DQuat::from_xyzw(0.3, -0.5, 0.2, 0.7).normalize();
+    oblique.positions.iter_mut().for_each(|p| *p = turn * *p);
+    let ball = TriangleSurface::boundary_of(&generate(Shape::Sphere, 3_000).unwrap());
+    let mut inner = ball.clone();
+    inner.positions.iter_mut().for_each(|p| *p *= 0.85);
+    inner.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    for (surface, pieces) in [(plate, 1), (oblique, 1), (together(ball, &inner), 1)] {
+        let solid = Solid::new(&surface).unwrap();
+        let mut attempts = 0;
+        let refused = tetrahedralize_with(&solid, 150, 0, &mut |_| attempts += 1);
+        assert!(refused.is_err() && attempts == 0);
+        let tets = recommended(&solid, 150);
+        let mesh = tetrahedralize(&solid, tets, 0).unwrap();
+        mesh.check().unwrap();
+        assert_eq!(mesh.pieces().count, pieces, "{tets}");
+        assert!(mesh.tets.len().abs_diff(tets) * 50 <= tets);
+        // Two layers of vertices: where a layer lies near the surface, up to a sixth is beveled away.
+        let part = mesh.total_volume() / solid.volume();
+        assert!(part > 0.85, "{tets}: {part}");
+        // No hole: only the thin corners of a plate lie farther away than a spacing.
+        assert!(missed(&solid, &surface, &mesh) < 2.0);
+    }
+}
+
+/// Each triangle of a surface is found by points near its middle, in the numbers of the surface: also where some were
+/// dropped or turned.
+#[test]
+fn nearest_triangles_have_the_numbers_of_the_surface() {
+    let mut surface = TriangleSurface::boundary_of(&generate(Shape::Torus, 400).unwrap());
+    let first = surface.triangles[0];
+    surface.triangles.insert(5, [first[0], first[1], first[0]]);
+    surface.triangles[7].swap(0, 1);
+    let solid = Solid::new(&surface).unwrap();
+    for (t, triangle) in surface
+        .triangles
+        .iter()
+        .enumerate()
+        .filter(|(t, _)| *t != 5)
+    {
+        let [a, b, c] = triangle.map(|p| surface.positions[p.index()]);
+        assert_eq!(solid.nearest_triangle((a + b + c) / 3.0), t);
+    }
 }

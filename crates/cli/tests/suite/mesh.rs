@@ -1,5 +1,7 @@
 //! `incise mesh`: generating, converting and looking at meshes.
 
+use incise::mesh::TriangleSurface;
+use incise::mesh_io::{self, OwnedValues};
 use serde_json::Value;
 
 use crate::support::{Sandbox, keys, names};
@@ -287,4 +289,211 @@ fn the_boundary_of_a_body_is_written_as_a_surface_and_filled_again() {
     assert!(told.contains("1 piece\n"), "{told}");
     let report = info(&sandbox, "again.msh");
     assert!(report["tets"].as_u64().unwrap().abs_diff(600) <= 12);
+}
+
+/// OBJ, PLY and OFF files of a body have the points of its boundary and no others.
+#[test]
+fn surfaces_of_a_mesh_have_no_points_inside() {
+    let sandbox = Sandbox::with_mesh();
+    let mesh = mesh_io::read(sandbox.path("box.vtk")).unwrap();
+    let boundary = TriangleSurface::boundary_of(&mesh);
+    let mut used: Vec<_> = boundary.triangles.as_flattened().to_vec();
+    used.sort_unstable();
+    used.dedup();
+    assert!(used.len() < mesh.positions.len());
+    for name in ["s.obj", "s.ply", "s.off"] {
+        sandbox.good(&["mesh", "convert", "box.vtk", name]);
+        let surface = mesh_io::read_surface(sandbox.path(name)).unwrap();
+        let expected: Vec<_> = used.iter().map(|p| mesh.positions[p.index()]).collect();
+        assert_eq!(surface.positions, expected, "{name}");
+        let at = |surface: &TriangleSurface| -> Vec<_> {
+            let corners = surface.triangles.as_flattened().iter();
+            corners.map(|p| surface.positions[p.index()]).collect()
+        };
+        assert_eq!(at(&surface), at(&boundary), "{name}");
+    }
+    // Generated bodies, too.
+    sandbox.good(&["mesh", "generate", "box", "--tets", "400", "direct.off"]);
+    assert!(sandbox.read("direct.off") == sandbox.read("s.off"));
+}
+
+/// Surfaces are converted and described, and where tets are needed the message names the command that makes them.
+#[test]
+fn surfaces_are_taken_or_lead_to_tetrahedralize() {
+    let sandbox = Sandbox::new();
+    sandbox.write("cube.off", CUBE);
+    for pair in [
+        "cube.off", "a.obj", "a.stl", "a.ply", "a.glb", "a.gltf", "b.off",
+    ]
+    .windows(2)
+    {
+        sandbox.good(&["mesh", "convert", pair[0], pair[1]]);
+        let report = info(&sandbox, pair[1]);
+        assert_eq!(report["triangles"], 12, "{pair:?}");
+        assert_eq!(report["points"], 8, "{pair:?}");
+        assert_eq!(
+            (&report["closed"], &report["parts"]),
+            (&true.into(), &1.into())
+        );
+        assert_eq!(report["volume"], 8.0, "{pair:?}");
+        assert_eq!(report["area"], 24.0, "{pair:?}");
+        assert_eq!(
+            report["low"],
+            serde_json::json!([-1.0, -1.0, -1.0]),
+            "{pair:?}"
+        );
+    }
+    let text = sandbox.good(&["mesh", "info", "a.obj"]);
+    assert!(text.contains("incise mesh tetrahedralize a.obj"), "{text}");
+    sandbox.write(
+        "open.off",
+        CUBE.replace("8 6 0", "8 5 0").replace("4 3 0 4 7\n", ""),
+    );
+    let text = sandbox.good(&["mesh", "info", "open.off"]);
+    assert!(text.contains("is open"), "{text}");
+    let wrong = |arguments: &str| {
+        let outcome = sandbox.incise(&arguments.split(' ').collect::<Vec<_>>());
+        assert_eq!(outcome.code, 2, "{outcome:?}");
+        outcome.stderr
+    };
+    for arguments in [
+        "mesh convert a.obj a.vtk",
+        "color a.obj",
+        "run --mesh a.obj --frames 1 --no-pictures",
+    ] {
+        let error = wrong(arguments);
+        assert!(error.contains("incise mesh tetrahedralize"), "{error}");
+    }
+    assert!(wrong("mesh convert a.obj b.obj --repair").contains("omit it"));
+    sandbox.good(&["mesh", "generate", "box", "--tets", "300", "t.vtk"]);
+    let error = wrong("mesh tetrahedralize t.vtk u.vtk --tets 300");
+    assert!(error.contains("incise mesh convert"), "{error}");
+    let error = wrong("mesh tetrahedralize a.obj u.step --tets 300");
+    assert!(
+        error.contains("u.step") && error.contains(".vtk"),
+        "{error}"
+    );
+}
+
+/// The texture of a square column goes around it: u is the side, v the height.
+#[test]
+fn texture_coordinates_are_kept_by_filling() {
+    let sandbox = Sandbox::new();
+    let mut text = String::new();
+    let ring = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
+    for z in [-1, 1] {
+        for [x, y] in ring {
+            text += &format!("v {x} {y} {z}\n");
+        }
+    }
+    text += "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n";
+    for i in 0..4 {
+        let (a, b) = (i + 1, (i + 1) % 4 + 1);
+        text += &format!("f {a}/1 {b}/2 {}/3 {}/4\n", b + 4, a + 4);
+    }
+    text += "f 5/1 6/2 7/3 8/4\nf 4/1 3/2 2/3 1/4\n";
+    sandbox.write("column.obj", text);
+    sandbox.good(&["mesh", "convert", "column.obj", "column.glb"]);
+    for surface in ["column.obj", "column.glb"] {
+        sandbox.good(&["mesh", "tetrahedralize", surface, "c.vtu", "--tets", "1000"]);
+        let file = mesh_io::read_file(sandbox.path("c.vtu")).unwrap();
+        let texture = file
+            .particles
+            .iter()
+            .find(|field| field.name == "texture_coordinates");
+        let OwnedValues::Vectors(texture) = &texture.unwrap().values else {
+            panic!("pairs are vectors");
+        };
+        let mut checked = 0;
+        for (x, uv) in file.mesh.positions.iter().zip(texture) {
+            // On a side, away from its edges: where the side y = -1 is nearest.
+            if x.y < -0.9 && x.x.abs() < 0.7 && x.z.abs() < 0.7 {
+                let expected = [0.5 * (x.x + 1.0), 0.5 * (x.z + 1.0), 0.0];
+                for (found, expected) in uv.to_array().iter().zip(expected) {
+                    // Floats in the .glb.
+                    assert!((found - expected).abs() < 1e-6, "{surface}: {x} {uv}");
+                }
+                checked += 1;
+            }
+        }
+        assert!(checked > 10, "{checked}");
+    }
+}
+
+/// A plate of a hundredth of its side: refused in seconds with the number of tets that it needs.
+#[test]
+fn thin_plates_are_refused_with_a_number() {
+    let sandbox = Sandbox::new();
+    let plate = CUBE.replace(
+        "-1 -1 -1\n1 -1 -1\n1 1 -1\n-1 1 -1\n",
+        "-1 -1 -0.01\n1 -1 -0.01\n1 1 -0.01\n-1 1 -0.01\n",
+    );
+    let plate = plate.replace(
+        "-1 -1 1\n1 -1 1\n1 1 1\n-1 1 1\n",
+        "-1 -1 0.01\n1 -1 0.01\n1 1 0.01\n-1 1 0.01\n",
+    );
+    sandbox.write("plate.off", plate);
+    let start = std::time::Instant::now();
+    let fill = "mesh tetrahedralize plate.off p.vtk --tets 1000";
+    let outcome = sandbox.incise(&fill.split(' ').collect::<Vec<_>>());
+    assert_eq!(outcome.code, 2);
+    assert!(
+        outcome.stderr.contains("ask for 310000 tets or more"),
+        "{outcome:?}"
+    );
+    assert!(start.elapsed().as_secs() < 10);
+}
+
+/// Two balls on a thin rod fall apart: the warning says so, with places.
+#[test]
+fn lost_parts_have_a_warning_with_their_place() {
+    let sandbox = Sandbox::new();
+    sandbox.write("cube.off", CUBE);
+    // A cube with a needle on its upper side.
+    let needle = CUBE
+        .replace("8 6 0", "12 11 0")
+        .replace(
+            "-1 1 1\n",
+            "-1 1 1\n-0.02 -0.02 1\n0.02 -0.02 1\n0 0.02 1\n0 0 3\n",
+        )
+        .replace(
+            "4 4 5 6 7\n",
+            "3 4 5 8\n3 5 9 8\n3 5 6 9\n4 6 7 10 9\n4 7 4 8 10\n3 8 9 11\n3 9 10 11\n3 10 8 11\n",
+        )
+        .replace("12 11 0", "12 13 0");
+    sandbox.write("needle.off", needle);
+    let fill = "mesh tetrahedralize needle.off n.vtk --tets 2000";
+    let outcome = sandbox.incise(&fill.split(' ').collect::<Vec<_>>());
+    assert_eq!(outcome.code, 0, "{outcome:?}");
+    assert!(
+        outcome.stderr.starts_with("warning: parts of the surface")
+            && outcome
+                .stderr
+                .contains("the farthest at (0.000, 0.000, 3.000)"),
+        "{outcome:?}"
+    );
+}
+
+#[test]
+fn inverted_input_names_the_repair() {
+    let sandbox = Sandbox::new();
+    sandbox.write(
+        "inverted.mesh",
+        "MeshVersionFormatted 2 Dimension 3 Vertices 4 0 0 0 0 1 0 0 0 0 1 0 0 0 0 1 0\n Tetrahedra 1 1 3 2 4 0 End\n",
+    );
+    for arguments in [
+        "mesh info inverted.mesh",
+        "run --mesh inverted.mesh --frames 1 --no-pictures",
+    ] {
+        let outcome = sandbox.incise(&arguments.split(' ').collect::<Vec<_>>());
+        assert_eq!(outcome.code, 2);
+        assert!(
+            outcome
+                .stderr
+                .contains("incise mesh convert IN OUT --repair"),
+            "{outcome:?}"
+        );
+    }
+    sandbox.good(&["mesh", "convert", "inverted.mesh", "sound.mesh", "--repair"]);
+    sandbox.good(&["mesh", "info", "sound.mesh"]);
 }

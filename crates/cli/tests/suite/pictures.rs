@@ -200,3 +200,49 @@ fn pictures_of_an_earlier_run_are_not_left_among_those_of_this_one() {
     run(&sandbox, &[&usual[..], &["2", "--no-pictures"]].concat());
     assert_eq!(pngs(&sandbox, "out"), expected[3..]);
 }
+
+/// Delays of the images of an animated PNG in seconds, and their number.
+fn delays(sandbox: &Sandbox, name: &str) -> Vec<f64> {
+    let bytes = fs::read(sandbox.path(name)).unwrap();
+    let chunks = bytes
+        .windows(4)
+        .enumerate()
+        .filter(|(_, word)| word == b"fcTL");
+    let number = |at: usize| f64::from(u16::from_be_bytes([bytes[at], bytes[at + 1]]));
+    chunks
+        .map(|(at, _)| number(at + 24) / number(at + 26))
+        .collect()
+}
+
+/// A second of simulated time has as many images as asked for and lasts a second.
+#[test]
+fn animations_have_the_wanted_rate() {
+    let sandbox = Sandbox::with_scene();
+    // 63 frames of 16 ms.
+    for (rate, images) in [("10", 10), ("30", 30), ("62.5", 63)] {
+        let name = format!("at{rate}.png");
+        let arguments = [
+            "--frames",
+            "63",
+            "--size",
+            "24x16",
+            "--no-pictures",
+            "--quiet",
+        ];
+        run(
+            &sandbox,
+            &[&arguments[..], &["--animation", &name, "--fps", rate]].concat(),
+        );
+        let delays = delays(&sandbox, &name);
+        assert_eq!(delays.len(), images, "{rate}");
+        let seconds: f64 = delays.iter().sum();
+        assert!(
+            (seconds - images as f64 / rate.parse::<f64>().unwrap()).abs() < 2e-3,
+            "{rate}: {seconds}"
+        );
+    }
+    let more = ["run", "scene.toml", "--animation", "a.gif", "--fps", "70"];
+    refused_in_a_sentence(&sandbox, &more, &["--fps 70", "62.5 frames per second"]);
+    let alone = sandbox.incise(&["run", "scene.toml", "--fps", "30"]);
+    assert!(alone.stderr.contains("--animation"), "{alone:?}");
+}

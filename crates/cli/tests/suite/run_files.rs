@@ -5,6 +5,7 @@ use std::fs;
 
 use incise::mesh::TetMesh;
 use incise::mesh::glam::DVec3;
+use incise::mesh_io::{NamedValues, OwnedValues};
 use incise::{Scene, Simulation};
 
 use crate::support::{SCENE, Sandbox};
@@ -298,4 +299,99 @@ fn a_failed_run_leaves_nothing_half_written() {
                 .ends_with("</VTKFile>")
         );
     }
+}
+
+/// A free box falls: displacements and velocities of its files are those of the closed form, it is not stretched, and the
+/// tags of a cut are those of the simulation.
+#[test]
+fn files_have_piece_stretch_displacement_velocity_and_cut() {
+    let sandbox = Sandbox::with_scene();
+    let run = "run scene.toml --frames 3 --quiet --no-pictures";
+    sandbox.good(&run.split(' ').collect::<Vec<_>>());
+    let surface = sandbox.read("out/surface_00002.vtp");
+    for name in ["displacement", "velocity", "cut", "piece", "stretch"] {
+        assert!(surface.contains(&format!("Name=\"{name}\"")), "{name}");
+    }
+    let file = incise::mesh_io::read_file(sandbox.path("out/mesh.vtu")).unwrap();
+    let scalars = |fields: &[NamedValues], name: &str| -> Vec<f64> {
+        match &fields
+            .iter()
+            .find(|field| field.name == name)
+            .unwrap()
+            .values
+        {
+            OwnedValues::Scalars(values) => values.clone(),
+            OwnedValues::Vectors(_) => panic!("{name} are vectors"),
+        }
+    };
+    let vectors = |name: &str| -> Vec<DVec3> {
+        match &file
+            .particles
+            .iter()
+            .find(|field| field.name == name)
+            .unwrap()
+            .values
+        {
+            OwnedValues::Vectors(values) => values.clone(),
+            OwnedValues::Scalars(_) => panic!("{name} are scalars"),
+        }
+    };
+    let scene = Scene::from_toml(SCENE).unwrap();
+    let mut simulation = Simulation::new(&scene).unwrap();
+    for _ in 0..3 {
+        simulation.step().unwrap();
+    }
+    let time = 3.0 * simulation.time_step();
+    for velocity in vectors("velocity") {
+        // Rounded to single precision, in each of some substeps.
+        assert!(
+            (velocity - DVec3::Z * -9.81 * time).length() < 1e-4,
+            "{velocity}"
+        );
+    }
+    let (rest, displacements) = (vectors("rest_position"), vectors("displacement"));
+    for ((now, rest), displacement) in file.mesh.positions.iter().zip(rest).zip(displacements) {
+        assert_eq!(*now - rest, displacement);
+        // Between the ends of explicit and implicit steps of a fall.
+        assert!((-0.02..-0.01).contains(&displacement.z), "{displacement}");
+    }
+    for stretch in scalars(&file.tets, "stretch") {
+        assert!((stretch - 1.0).abs() < 1e-4, "{stretch}");
+    }
+    let pieces: Vec<f64> = simulation
+        .piece_numbers()
+        .into_iter()
+        .map(f64::from)
+        .collect();
+    assert_eq!(scalars(&file.tets, "piece"), pieces);
+    let on_cut = simulation
+        .on_cut()
+        .iter()
+        .map(|&is| f64::from(u8::from(is)));
+    assert!(scalars(&file.particles, "cut").into_iter().eq(on_cut));
+}
+
+#[test]
+fn a_shorter_run_leaves_no_surface_of_the_longer_one() {
+    let sandbox = Sandbox::with_scene();
+    let run = |frames: &'static str| {
+        [
+            "run",
+            "scene.toml",
+            "--quiet",
+            "--size",
+            "64x48",
+            "--frames",
+            frames,
+        ]
+    };
+    sandbox.good(&run("5"));
+    sandbox.write("out/surface_mine.vtp", "kept");
+    sandbox.good(&run("2"));
+    let names = sandbox.names("out");
+    let surfaces: Vec<_> = names.iter().filter(|name| name.ends_with(".vtp")).collect();
+    assert_eq!(
+        surfaces,
+        ["surface_00000.vtp", "surface_00001.vtp", "surface_mine.vtp"]
+    );
 }

@@ -6,10 +6,12 @@
 
 use std::time::Instant;
 
+use glam::DVec3;
 use incise_mesh::ParticleId;
 
 use super::Simulation;
 use crate::Error;
+use crate::backend::each;
 use crate::measure::{
     by_body, contact, energy, kappa, max_speed, residual, residuals_of_tets, softened, states,
     volume,
@@ -138,6 +140,33 @@ impl Simulation {
             self.state.report.repaired += self.fetch(&mut Milliseconds::default())?;
         }
         Ok(())
+    }
+
+    /// Returns the velocities of all particles of [`Simulation::mesh`] in m/s; on a device those of the last
+    /// [`Simulation::read_back`]. O(particles).
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     "[world]\ngravity = [0.0, 0.0, -10.0]\n[[body]]\nshape = { kind = \"box\", tets = 200 }",
+    /// )?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// simulation.step()?;
+    /// let expected = DVec3::Z * -10.0 * simulation.time_step();
+    /// assert!(simulation.velocities().iter().all(|v| (*v - expected).length() < 1e-4));
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn velocities(&self) -> Vec<DVec3> {
+        let particles = 0..self.mesh().positions.len();
+        let of_particle = |p| {
+            let (island, particle) = self.location_of(ParticleId::new(p));
+            each!(&self.state.islands[island].solver, solver => solver.velocity(particle))
+        };
+        particles.map(of_particle).collect()
     }
 
     /// Returns a note on the compute device: its name, or why `auto` took the CPU; `None` if the scene requests the

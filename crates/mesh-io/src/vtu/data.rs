@@ -11,6 +11,8 @@
 
 use miniz_oxide::inflate::decompress_to_vec_zlib_with_limit;
 
+use crate::base64::{decode, next_group};
+
 /// The representation of numbers in the whole file.
 #[derive(Clone, Copy)]
 pub(super) struct Storage {
@@ -122,46 +124,4 @@ impl Stream<'_> {
         }
         Ok(data)
     }
-}
-
-/// The next four digits, without blanks and line ends.
-fn next_group(text: &mut &[u8]) -> Option<[u8; 4]> {
-    let mut group = [0; 4];
-    let mut found = 0;
-    while found < 4 {
-        let (&byte, rest) = text.split_first()?;
-        *text = rest;
-        if !byte.is_ascii_whitespace() {
-            group[found] = byte;
-            found += 1;
-        }
-    }
-    Some(group)
-}
-
-/// Four digits as up to three bytes.
-fn decode(group: [u8; 4]) -> Option<([u8; 3], usize)> {
-    let padding = group
-        .iter()
-        .rev()
-        .take_while(|&&digit| digit == b'=')
-        .count();
-    if padding > 2 {
-        return None;
-    }
-    let mut bits = 0_u32;
-    for &digit in &group[..4 - padding] {
-        let value = match digit {
-            b'A'..=b'Z' => digit - b'A',
-            b'a'..=b'z' => digit - b'a' + 26,
-            b'0'..=b'9' => digit - b'0' + 52,
-            b'+' => 62,
-            b'/' => 63,
-            _ => return None,
-        };
-        bits = bits << 6 | u32::from(value);
-    }
-    bits <<= 6 * padding;
-    let [_, a, b, c] = bits.to_be_bytes();
-    Some(([a, b, c], 3 - padding))
 }

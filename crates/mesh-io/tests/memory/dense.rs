@@ -258,6 +258,15 @@ pub(super) fn dense() -> Vec<(&'static str, &'static str, Vec<u8>)> {
     );
     let polygons = format!("f{}\n", " 1".repeat(30)).repeat(n);
     add("obj", "polygons", format!("v 0 0 0\n{polygons}").into());
+    add("obj", "texture points", "vt 0\n".repeat(20 * n).into());
+    let polygons = format!("f{}\n", " 1/1".repeat(30)).repeat(n);
+    add(
+        "obj",
+        "texture",
+        format!("v 0 0 0\nvt 0\n{polygons}").into(),
+    );
+    let one_polygon = format!("v 0 0 0\nvt 0\nf{}\n", " 1/1".repeat(10 * n));
+    add("obj", "texture of one polygon", one_polygon.into());
     add(
         "off",
         "text",

@@ -28,7 +28,7 @@ fn peak(name: &str, bytes: &[u8]) -> (u64, Result<(), MeshIoError>) {
                 let [nodes, tets] = [files.next(), files.next()].map(Option::unwrap_or_default);
                 incise_mesh_io::parse_tetgen("a.node", nodes, tets).map(drop)
             }
-            "obj" | "stl" | "ply" | "off" => {
+            "obj" | "stl" | "ply" | "off" | "glb" => {
                 incise_mesh_io::parse_surface(format!("a.{name}"), bytes).map(drop)
             }
             _ => incise_mesh_io::parse_file(format!("a.{name}"), bytes).map(drop),
@@ -168,6 +168,9 @@ fn wrong_counts_reserve_no_memory() {
             ("off", format!("1 {count}\n0 0 0\n3 0 0 0\n")),
             ("off", format!("1 1\n0 0 0\n{count} 0 0 0\n")),
             ("obj", format!("v 0 0 0\nf 1 1 {count}\n")),
+            ("glb", gltf(count, "4", "4")),
+            ("glb", gltf("1", count, "4")),
+            ("glb", gltf("1", "4", count)),
             ("ply", ply(count, "1", "0 0 0\n")),
             ("ply", ply("1", count, "0 0 0\n3 0 0 0\n")),
             ("ply", ply("1", "1", &format!("0 0 0\n{count} 0 0 0\n"))),
@@ -203,6 +206,29 @@ fn wrong_counts_reserve_no_memory() {
             assert!(result.is_err());
             assert!(peak <= SLACK, "{peak} for {name}");
         }
+    }
+}
+
+/// A glTF file of one point.
+fn gltf(points: &str, view: &str, buffer: &str) -> String {
+    format!(
+        "{{\"asset\":{{\"version\":\"2.0\"}},\"meshes\":[{{\"primitives\":[{{\"attributes\":{{\"POSITION\":0}}}}]}}],
+        \"buffers\":[{{\"byteLength\":{buffer},\"uri\":\"data:;base64,AAAAAA==\"}}],
+        \"bufferViews\":[{{\"buffer\":0,\"byteLength\":{view}}}],
+        \"accessors\":[{{\"bufferView\":0,\"componentType\":5126,\"count\":{points},\"type\":\"VEC3\",\"min\":[0,0,0],\"max\":[0,0,0]}}]}}"
+    )
+}
+
+/// The text of a glTF file may consist of empty objects.
+#[test]
+fn empty_objects_of_gltf() {
+    let head = "{\"asset\":{\"version\":\"2.0\"}";
+    for list in ["nodes", "materials", "scenes", "samplers"] {
+        let text = format!("{head},\"{list}\":[{}{{}}]}}", "{},".repeat(50_000));
+        let (most, result) = peak("glb", text.as_bytes());
+        assert!(result.is_err());
+        let size = text.len() as u64;
+        assert!(most <= 500 * size + SLACK, "{list}: {most} for {size}");
     }
 }
 

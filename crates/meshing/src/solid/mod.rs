@@ -39,8 +39,11 @@ pub use prepare::Prepared;
 #[derive(Clone, Debug)]
 pub struct Solid {
     tree: Tree,
+    /// Index in the given surface of each triangle that the tree was built from.
+    numbers: Vec<u32>,
     prepared: Prepared,
     volume: f64,
+    area: f64,
 }
 
 impl Solid {
@@ -55,11 +58,17 @@ impl Solid {
     /// is open or not orientable; the message names the first such edge.
     pub fn new(surface: &TriangleSurface) -> Result<Self, MeshingError> {
         let (prepared, triangles) = prepare::prepare(surface)?;
-        let volume = volume(&triangles);
+        let volume = volume(&triangles.corners);
+        let areas = triangles.corners.iter();
+        let area = areas
+            .map(|[a, b, c]| 0.5 * (*b - *a).cross(*c - *a).length())
+            .sum();
         Ok(Self {
-            tree: Tree::new(triangles),
+            tree: Tree::new(&triangles.corners),
+            numbers: triangles.numbers,
             prepared,
             volume,
+            area,
         })
     }
 
@@ -91,6 +100,12 @@ impl Solid {
     #[must_use]
     pub const fn volume(&self) -> f64 {
         self.volume
+    }
+
+    /// Area of the surface in m².
+    #[must_use]
+    pub const fn area(&self) -> f64 {
+        self.area
     }
 
     /// Winding number of the surface around a point: 1 inside a simple surface, 0 outside. Exact; a point on the
@@ -127,18 +142,58 @@ impl Solid {
         nearest::distance_within(&self.tree, point, reach)
     }
 
+    /// Index of a triangle of the given surface that is nearest to a point. Deterministic; usually O(log n).
+    ///
+    /// # Example
+    /// ```
+    /// use incise_mesh::{TriangleSurface, glam::{DVec3, dvec3}, kuhn_box};
+    /// use incise_meshing::Solid;
+    ///
+    /// let surface = TriangleSurface::boundary_of(&kuhn_box([1, 1, 1], DVec3::ONE));
+    /// let above = Solid::new(&surface)?.nearest_triangle(dvec3(0.7, 0.4, 3.0));
+    /// let corners = surface.triangles[above].map(|p| surface.positions[p.index()]);
+    /// assert!(corners.iter().all(|p| p.z == 1.0));
+    /// # Ok::<(), incise_meshing::MeshingError>(())
+    /// ```
+    #[must_use]
+    pub fn nearest_triangle(&self, point: DVec3) -> usize {
+        let found = nearest::nearest_triangle(&self.tree, point);
+        self.numbers[self.tree.number(found)] as usize
+    }
+
     /// Largest distance from points of `surface` to this solid's surface, in meters: a one-sided Hausdorff distance,
     /// sampled at the corners, edge midpoints and centroids of its triangles.
     #[must_use]
     pub fn farthest(&self, surface: &TriangleSurface) -> f64 {
-        let mut farthest = 0.0_f64;
+        self.farthest_point(surface).1
+    }
+
+    /// The point of `surface` that is farthest from this solid's surface, and its distance in meters, sampled like
+    /// [`farthest`](Self::farthest). The origin and 0 for a surface without triangles. Usually O(log n) for a sample.
+    ///
+    /// # Example
+    /// ```
+    /// use incise_mesh::{TriangleSurface, glam::{DVec3, dvec3}, kuhn_box};
+    /// use incise_meshing::Solid;
+    ///
+    /// let cube = TriangleSurface::boundary_of(&kuhn_box([1, 1, 1], DVec3::ONE));
+    /// let mut other = cube.clone();
+    /// other.positions.iter_mut().filter(|p| **p == DVec3::ONE).for_each(|p| p.x = 1.5);
+    /// let (point, distance) = Solid::new(&cube)?.farthest_point(&other);
+    /// assert_eq!((point, distance), (dvec3(1.5, 1.0, 1.0), 0.5));
+    /// # Ok::<(), incise_meshing::MeshingError>(())
+    /// ```
+    #[must_use]
+    pub fn farthest_point(&self, surface: &TriangleSurface) -> (DVec3, f64) {
+        let mut farthest = (DVec3::ZERO, 0.0);
         for triangle in &surface.triangles {
             let [a, b, c] = triangle.map(|p| surface.positions[p.index()]);
             let middle = (a + b + c) / 3.0;
             for point in [a, b, c, middle, a.midpoint(b), b.midpoint(c), c.midpoint(a)] {
-                // Distances below the maximum so far need not be exact.
                 let distance = self.distance_within(point, f64::INFINITY);
-                farthest = farthest.max(distance);
+                if distance > farthest.1 {
+                    farthest = (point, distance);
+                }
             }
         }
         farthest

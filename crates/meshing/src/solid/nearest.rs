@@ -3,14 +3,29 @@
 //! Source: C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.5 (the nearest point of a triangle by the
 //! regions of its corners and edges). Cost: usually O(log n); O(n) for points equally far from many triangles.
 
+use std::cell::Cell;
+
 use glam::DVec3;
 
 use super::tree::Tree;
 
 /// Distance to the nearest triangle, or `reach` if none is nearer.
 pub(super) fn distance_within(tree: &Tree, point: DVec3, reach: f64) -> f64 {
-    tree.nearest(point, reach * reach, |t| distance_squared(t, point))
+    tree.nearest(point, reach * reach, |_, t| distance_squared(t, point))
         .sqrt()
+}
+
+/// Index in the tree of a nearest triangle: of equally near ones the first that the search meets.
+pub(super) fn nearest_triangle(tree: &Tree, point: DVec3) -> usize {
+    let nearest = Cell::new((f64::INFINITY, 0));
+    tree.nearest(point, f64::INFINITY, |t, corners| {
+        let distance = distance_squared(corners, point);
+        if distance < nearest.get().0 {
+            nearest.set((distance, t));
+        }
+        distance
+    });
+    nearest.get().1
 }
 
 /// Squared distance from a point to a triangle, which may be degenerate.

@@ -10,6 +10,7 @@ use glam::DVec3;
 use incise_mesh::{DisjointSets, ParticleId, TriangleSurface};
 
 use crate::MeshingError;
+use crate::index::index;
 
 /// Repairs of a surface used as the boundary of a solid.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,10 +28,15 @@ pub struct Prepared {
     pub shells: usize,
 }
 
-/// Corners of all triangles, in a consistent orientation that encloses a positive volume.
-pub(super) fn prepare(
-    surface: &TriangleSurface,
-) -> Result<(Prepared, Vec<[DVec3; 3]>), MeshingError> {
+/// Corners of all triangles that are kept, in a consistent orientation that encloses a positive volume.
+pub(super) struct Triangles {
+    pub(super) corners: Vec<[DVec3; 3]>,
+    /// Index of each in the surface.
+    pub(super) numbers: Vec<u32>,
+}
+
+/// Repairs a surface.
+pub(super) fn prepare(surface: &TriangleSurface) -> Result<(Prepared, Triangles), MeshingError> {
     let positions = &surface.positions;
     if let Some(p) = positions.iter().position(|p| !p.is_finite()) {
         return fault(format!(
@@ -42,6 +48,7 @@ pub(super) fn prepare(
     let same = weld(positions);
     prepared.welded = (0..same.len()).filter(|&p| same[p] as usize != p).count();
     let mut triangles = Vec::with_capacity(surface.triangles.len());
+    let mut numbers = Vec::with_capacity(surface.triangles.len());
     for (t, triangle) in surface.triangles.iter().enumerate() {
         if let Some(p) = triangle.iter().find(|p| p.index() >= positions.len()) {
             let count = positions.len();
@@ -52,6 +59,7 @@ pub(super) fn prepare(
             prepared.degenerate += 1;
         } else {
             triangles.push([a, b, c]);
+            numbers.push(t);
         }
     }
     if triangles.is_empty() {
@@ -77,7 +85,8 @@ pub(super) fn prepare(
             triangle.swap(1, 2);
         }
     }
-    Ok((prepared, corners))
+    let numbers = numbers.into_iter().map(index).collect();
+    Ok((prepared, Triangles { corners, numbers }))
 }
 
 fn fault<T>(message: String) -> Result<T, MeshingError> {

@@ -1,7 +1,7 @@
 //! [`Tree`]: triangles in a binary tree of boxes, for nearest-triangle and ray queries.
 //!
 //! Triangles are split at the median of their box centers along the longest side until few are left. Nodes lie in one
-//! array, the left child directly after its parent. Cost: O(n log n) to build, 56 bytes per node and 72 per triangle.
+//! array, the left child directly after its parent. Cost: O(n log n) to build, 56 bytes per node and 76 per triangle.
 
 use glam::DVec3;
 use incise_mesh::Bounds;
@@ -27,18 +27,30 @@ struct Node {
 pub(super) struct Tree {
     nodes: Vec<Node>,
     triangles: Vec<[DVec3; 3]>,
+    /// Index of each triangle in the list that the tree was built from.
+    numbers: Vec<u32>,
 }
 
 impl Tree {
     /// Builds a tree of at least one and fewer than 2³¹ triangles.
-    pub(super) fn new(mut triangles: Vec<[DVec3; 3]>) -> Self {
+    pub(super) fn new(triangles: &[[DVec3; 3]]) -> Self {
         let mut nodes = Vec::with_capacity(triangles.len());
-        split(&mut triangles, 0, &mut nodes);
-        Self { nodes, triangles }
+        let mut numbers: Vec<u32> = (0..).take(triangles.len()).collect();
+        split(triangles, &mut numbers, 0, &mut nodes);
+        Self {
+            nodes,
+            triangles: numbers.iter().map(|&t| triangles[t as usize]).collect(),
+            numbers,
+        }
     }
 
     pub(super) fn triangles(&self) -> &[[DVec3; 3]] {
         &self.triangles
+    }
+
+    /// Index in the list that the tree was built from of the triangle at an index of the tree.
+    pub(super) fn number(&self, triangle: usize) -> usize {
+        self.numbers[triangle] as usize
     }
 
     pub(super) fn bounds(&self) -> Bounds {
@@ -74,13 +86,13 @@ impl Tree {
         }
     }
 
-    /// Searches boxes from near to far: `distance` of a triangle replaces `best` if smaller, and boxes farther than
-    /// `best` are skipped. All distances are squared.
+    /// Searches boxes from near to far: `distance` of a triangle, which also gets its index in the tree, replaces `best`
+    /// if smaller, and boxes farther than `best` are skipped. All distances are squared.
     pub(super) fn nearest(
         &self,
         point: DVec3,
         mut best: f64,
-        distance: impl Fn(&[DVec3; 3]) -> f64,
+        distance: impl Fn(usize, &[DVec3; 3]) -> f64,
     ) -> f64 {
         let mut waiting = [(0_u32, 0.0_f64); 64];
         waiting[0] = (0, self.nodes[0].bounds.distance_squared(point));
@@ -94,8 +106,8 @@ impl Tree {
             let node = &self.nodes[at as usize];
             if node.right == 0 {
                 let start = node.start as usize;
-                for triangle in &self.triangles[start..start + node.count as usize] {
-                    best = best.min(distance(triangle));
+                for t in start..start + node.count as usize {
+                    best = best.min(distance(t, &self.triangles[t]));
                 }
                 continue;
             }
@@ -117,17 +129,18 @@ impl Tree {
     }
 }
 
-/// Creates the node of the given triangles, the first of which has number `start`, and its subtree.
-fn split(triangles: &mut [[DVec3; 3]], start: usize, nodes: &mut Vec<Node>) {
-    let bounds = Bounds::around(triangles.iter().flatten().copied());
+/// Creates the node of the triangles with the given indices, which start at `start` of all, and its subtree.
+fn split(triangles: &[[DVec3; 3]], numbers: &mut [u32], start: usize, nodes: &mut Vec<Node>) {
+    let corners = numbers.iter().flat_map(|&t| triangles[t as usize]);
+    let bounds = Bounds::around(corners);
     let here = nodes.len();
     nodes.push(Node {
         bounds,
         right: 0,
         start: index(start),
-        count: index(triangles.len()),
+        count: index(numbers.len()),
     });
-    if triangles.len() <= LEAF {
+    if numbers.len() <= LEAF {
         return;
     }
     let size = bounds.size();
@@ -135,14 +148,14 @@ fn split(triangles: &mut [[DVec3; 3]], start: usize, nodes: &mut Vec<Node>) {
         0,
         |best, axis| if size[axis] > size[best] { axis } else { best },
     );
-    let twice_middle = |t: &[DVec3; 3]| {
-        let along = t.map(|p| p[axis]);
+    let twice_middle = |t: u32| {
+        let along = triangles[t as usize].map(|p| p[axis]);
         along[0].min(along[1]).min(along[2]) + along[0].max(along[1]).max(along[2])
     };
-    let half = triangles.len() / 2;
-    triangles.select_nth_unstable_by(half, |s, t| twice_middle(s).total_cmp(&twice_middle(t)));
-    let (left, right) = triangles.split_at_mut(half);
-    split(left, start, nodes);
+    let half = numbers.len() / 2;
+    numbers.select_nth_unstable_by(half, |&s, &t| twice_middle(s).total_cmp(&twice_middle(t)));
+    let (left, right) = numbers.split_at_mut(half);
+    split(triangles, left, start, nodes);
     nodes[here].right = index(nodes.len());
-    split(right, start + half, nodes);
+    split(triangles, right, start + half, nodes);
 }

@@ -13,7 +13,7 @@ fn errors_name_the_place() {
     let stl = "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid\n";
     let cases: &[(Parse, &str, &[Change])] = &[
         (
-            obj::parse_obj,
+            parse_obj,
             obj,
             &[
                 ("v 0 1 0", "v 0 1", "a:3: a point has less than 3"),

@@ -15,6 +15,10 @@ use crate::test_files::cut;
 
 type Parse = fn(&[u8], &Path) -> Result<TriangleSurface, MeshIoError>;
 
+fn parse_obj(bytes: &[u8], path: &Path) -> Result<TriangleSurface, MeshIoError> {
+    obj::parse_obj(bytes, path).map(|file| file.surface)
+}
+
 fn bytes_of(write: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Vec<u8> {
     let mut bytes = Vec::new();
     write(&mut bytes).expect("memory takes everything");
@@ -29,7 +33,10 @@ fn forms(surface: &TriangleSurface) -> [(Parse, Vec<u8>); 7] {
             bytes_of(|out| stl::write_binary(out, surface)),
         ),
         (stl::parse_stl, bytes_of(|out| stl::write(out, surface))),
-        (obj::parse_obj, bytes_of(|out| obj::write(out, surface))),
+        (
+            parse_obj,
+            bytes_of(|out| obj::write(out, &surface.clone().into())),
+        ),
         (off::parse_off, bytes_of(|out| off::write(out, surface))),
         (
             ply::parse_ply,
@@ -93,7 +100,7 @@ proptest! {
         let text = bytes_of(|out| stl::write(out, &surface));
         prop_assert_eq!(corners(&parse(stl::parse_stl, &text).unwrap()), corners(&surface));
         let forms: [(Parse, Vec<u8>); 5] = [
-            (obj::parse_obj, bytes_of(|out| obj::write(out, &surface))),
+            (parse_obj, bytes_of(|out| obj::write(out, &surface.clone().into()))),
             (off::parse_off, bytes_of(|out| off::write(out, &surface))),
             (ply::parse_ply, bytes_of(|out| ply::write(out, &surface, PlyEncoding::Ascii))),
             (ply::parse_ply, bytes_of(|out| ply::write(out, &surface, PlyEncoding::LittleEndian))),
@@ -129,7 +136,7 @@ proptest! {
     #[test]
     fn any_bytes_are_no_reason_to_panic(bytes: Vec<u8>) {
         let starts = ["", "solid ", "OFF ", "f ", "ply\nformat binary_big_endian 1.0\n"];
-        for reader in [stl::parse_stl, off::parse_off, obj::parse_obj, ply::parse_ply] {
+        for reader in [stl::parse_stl, off::parse_off, parse_obj, ply::parse_ply] {
             for start in starts {
                 parse(reader, &[start.as_bytes(), &bytes].concat()).ok();
             }
@@ -195,11 +202,11 @@ fn obj_of_other_writers() {
     ] {
         let text =
             format!("# c\nmtllib a.mtl\no square\n{points}vt 0 0\nvn 0 0 1\ns off\n{face}\nl 1 2");
-        assert_square(obj::parse_obj, text.as_bytes());
-        assert_square(obj::parse_obj, text.replace('\n', "\r\n").as_bytes());
+        assert_square(parse_obj, text.as_bytes());
+        assert_square(parse_obj, text.replace('\n', "\r\n").as_bytes());
     }
     // Points after the face.
-    assert_square(obj::parse_obj, format!("f 1 2 3 4\n{points}").as_bytes());
+    assert_square(parse_obj, format!("f 1 2 3 4\n{points}").as_bytes());
 }
 
 #[test]
