@@ -6,6 +6,8 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use incise_render::{ColorBy, LARGEST_SIDE};
 
+use crate::share::Share;
+
 /// Cuts soft bodies in real time.
 #[derive(Debug, Parser)]
 #[command(
@@ -31,6 +33,8 @@ pub(crate) enum Command {
     Color(ColorArguments),
     /// Print the keys of scene files, or validate a scene.
     Scene(SceneArguments),
+    /// Run a scene for all combinations of values of its keys, and write one table.
+    Sweep(SweepArguments),
     /// Inspect, convert and generate meshes.
     #[command(after_help = "Example: incise mesh generate liver --tets 5000 liver.vtk")]
     Mesh {
@@ -141,6 +145,41 @@ impl RunArguments {
     pub(crate) fn draws(&self) -> bool {
         !self.no_pictures || self.animation.is_some()
     }
+}
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = "Example: incise sweep scene.toml --set solver.substeps=4,8,16 --set body[0].young_modulus=1e4,1e5 --out study\n\n\
+    The table is sweep.csv: the values of the keys, the outcome, the last reported value of each quantity, and times in ms. \
+    Machines share a study by --shard; see docs/cluster.md."
+)]
+pub(crate) struct SweepArguments {
+    /// The scene file.
+    pub(crate) scene: PathBuf,
+    /// A key of the scene and its values, separated by commas. Several keys give all combinations.
+    #[arg(long, value_name = "KEY=A,B,C", required = true)]
+    pub(crate) set: Vec<String>,
+    /// Number of frames of each run [default: 200, or more if a stroke ends later].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    pub(crate) frames: Option<u64>,
+    /// Folder of the results; a study continues from what it holds.
+    #[arg(long, value_name = "DIR", default_value = "out/sweep")]
+    pub(crate) out: PathBuf,
+    /// Run one share of the combinations, as 2/5 for the second of five, and write no table.
+    #[arg(long, value_name = "I/N", conflicts_with = "merge")]
+    pub(crate) shard: Option<Share>,
+    /// Run nothing: collect the shares in these folders, and write the table. A missing combination is an error.
+    #[arg(long, value_name = "DIR", num_args = 1..)]
+    pub(crate) merge: Vec<PathBuf>,
+    /// Write the table without missing combinations.
+    #[arg(long, requires = "merge")]
+    pub(crate) partial: bool,
+    /// Number of threads, at most 1024 [default: one for each core].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub(crate) threads: Option<u16>,
+    /// Print only errors.
+    #[arg(long)]
+    pub(crate) quiet: bool,
 }
 
 /// A size, as in `960x720`.

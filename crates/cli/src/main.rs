@@ -15,7 +15,9 @@ mod pictures;
 mod print;
 mod run;
 mod scene;
+mod share;
 mod summary;
+mod sweep;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -35,6 +37,7 @@ fn main() -> ExitCode {
         Some(Command::Advise(arguments)) => advise::advise(&arguments),
         Some(Command::Color(arguments)) => color::color(&arguments),
         Some(Command::Scene(arguments)) => scene::scene(&arguments),
+        Some(Command::Sweep(arguments)) => sweep::sweep(&arguments),
         Some(Command::Mesh { command }) => mesh::mesh(&command),
         Some(Command::Completions { shell }) => {
             let mut script = Vec::new();

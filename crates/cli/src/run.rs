@@ -21,16 +21,24 @@ use crate::summary::Summary;
 const FRAMES: u64 = 200;
 
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
-    let Some(threads) = arguments.threads.map(usize::from) else {
-        return simulate(arguments);
-    };
     // Drawing shares the threads of the simulation.
+    in_pool(arguments.threads, || simulate(arguments))
+}
+
+/// Runs a function on a pool of its own with this number of threads, or on the common one.
+pub(crate) fn in_pool(
+    threads: Option<u16>,
+    work: impl FnOnce() -> Result<(), Failure> + Send,
+) -> Result<(), Failure> {
+    let Some(threads) = threads.map(usize::from) else {
+        return work();
+    };
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|error| Error::Threads {
         threads,
         message: error.to_string(),
     })?;
-    pool.install(|| simulate(arguments))
+    pool.install(work)
 }
 
 /// Simulates and draws on the current thread pool.
@@ -42,9 +50,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         Animation::check_path(path).map_err(|error| Failure::Input(error.into()))?;
     }
     let scene = scene(arguments)?;
-    let frames = arguments
-        .frames
-        .unwrap_or_else(|| scene.frames_needed().max(FRAMES));
+    let frames = arguments.frames.unwrap_or_else(|| default_frames(&scene));
     let simulation = Simulation::new(&scene);
     let mut simulation = simulation.map_err(|error| located(error, arguments.scene.as_deref()))?;
     let pictures = Pictures::of(arguments, &scene, &simulation, frames)?;
@@ -116,6 +122,11 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         }
     }
     failed.map_or(Ok(()), |error| Err(Failure::Run(error)))
+}
+
+/// The number of frames of a run for which none is given.
+pub(crate) fn default_frames(scene: &Scene) -> u64 {
+    scene.frames_needed().max(FRAMES)
 }
 
 /// Prints a warning to stderr.

@@ -17,6 +17,7 @@ fn a_cell_is_measured_checked_and_shown() {
         backend: Backend::Cpu,
         out: out.clone(),
         shard: None,
+        complete: false,
     };
     let cells = experiment(&arguments, None).unwrap().cells;
     let cell = cells.iter().find(|c| c.id == "beam-hanging-1e5").unwrap();

@@ -27,6 +27,9 @@ pub(crate) struct ExperimentArguments {
     /// Measure one share of the cells only, as 2/5 for the second of five, and write no page: see `cargo xtask merge`.
     #[arg(long, value_name = "I/N")]
     pub(crate) shard: Option<Shard>,
+    /// True if no cell may be missing.
+    #[arg(skip)]
+    pub(crate) complete: bool,
 }
 
 /// Compute device of an experiment.

@@ -1,7 +1,7 @@
 //! `cargo xtask merge`: collects the cells of several runs and writes the pages.
 //!
 //! Complete experiments need no measurement: running their command with the merged folder writes the page. Cells that
-//! are missing in all folders are then measured.
+//! are missing in all folders are an error that names them, or with `--partial` are measured here.
 
 use std::fs;
 use std::path::PathBuf;
@@ -19,12 +19,16 @@ pub(crate) struct MergeArguments {
     /// Folders given as `--out` to the runs with `--shard`.
     #[arg(required = true)]
     from: Vec<PathBuf>,
+    /// Measure the cells that no folder has, instead of failing.
+    #[arg(long)]
+    partial: bool,
 }
 
 #[cfg(test)]
 impl MergeArguments {
     pub(super) const fn of(out: PathBuf, from: Vec<PathBuf>) -> Self {
-        Self { out, from }
+        let partial = false;
+        Self { out, from, partial }
     }
 }
 
@@ -56,6 +60,7 @@ pub(crate) fn merge(
                 backend: setup.backend,
                 out: arguments.out.clone(),
                 shard: None,
+                complete: !arguments.partial,
             };
             of_this.agree_with(&to.join("setup.json"))?;
             for file in fs::read_dir(&folder)? {

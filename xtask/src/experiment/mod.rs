@@ -12,7 +12,8 @@ mod plot;
 mod write;
 
 use std::fs;
-use std::path::Path;
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, ensure};
@@ -72,12 +73,32 @@ impl<R: Serialize + DeserializeOwned> Experiment<R> {
             .enumerate()
             .filter(|(place, _)| arguments.shard.is_none_or(|shard| shard.has(*place)))
             .collect();
+        let missing: Vec<&str> = mine
+            .iter()
+            .filter(|(_, cell)| !cell.file(&folder).exists())
+            .map(|(_, cell)| cell.id.as_str())
+            .collect();
+        ensure!(
+            !arguments.complete || missing.is_empty(),
+            "{}: {} of {} cells are missing ({}): merge the folder of their share, or give --partial to measure them here",
+            self.name,
+            missing.len(),
+            mine.len(),
+            missing.join(", ")
+        );
         let bar = progress(self.name, mine.len());
         let mut done = Vec::new();
         for (_, cell) in mine {
             bar.set_message(cell.id.clone());
             done.push(cell.done(&folder, &here)?);
             bar.inc(1);
+            log_line(&format!(
+                "{}: {}/{} {}",
+                self.name,
+                bar.position(),
+                bar.length().unwrap_or(0),
+                cell.id
+            ));
         }
         bar.finish_and_clear();
         if arguments.shard.is_some() {
@@ -108,6 +129,11 @@ impl<R: Serialize + DeserializeOwned> Cell<R> {
         }
     }
 
+    /// The file of the cell.
+    fn file(&self, folder: &Path) -> PathBuf {
+        folder.join(format!("{}.json", self.id))
+    }
+
     /// Reads the cell from its file, or measures it and writes the file.
     fn done(&self, folder: &Path, here: &Machine) -> anyhow::Result<Done<R>> {
         let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || ".-".contains(c);
@@ -116,7 +142,7 @@ impl<R: Serialize + DeserializeOwned> Cell<R> {
             "{:?} is not the name of a cell",
             self.id
         );
-        let path = folder.join(format!("{}.json", self.id));
+        let path = self.file(folder);
         if let Ok(text) = fs::read_to_string(&path) {
             return serde_json::from_str(&text).with_context(|| {
                 format!(
@@ -132,6 +158,14 @@ impl<R: Serialize + DeserializeOwned> Cell<R> {
         };
         write::replace(&path, &serde_json::to_string_pretty(&done)?)?;
         Ok(done)
+    }
+}
+
+/// Prints a line to stderr if it is not a terminal, as in the log of a cluster, where no bar is shown.
+#[expect(clippy::print_stderr, reason = "progress goes to stderr")]
+fn log_line(line: &str) {
+    if !std::io::stderr().is_terminal() {
+        eprintln!("{line}");
     }
 }
 

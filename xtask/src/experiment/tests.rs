@@ -14,6 +14,7 @@ fn arguments(out: PathBuf, shard: Option<&str>) -> ExperimentArguments {
         backend: Backend::Cpu,
         out,
         shard: shard.map(|s| s.parse().unwrap()),
+        complete: false,
     }
 }
 
@@ -122,6 +123,33 @@ fn shards_have_every_cell_once_and_merge_into_the_same_page() {
         [&whole, &gathered].map(|out| fs::read_to_string(out.join("squares.json")).unwrap());
     assert_eq!(a, b);
     for out in [whole, first, second, gathered] {
+        fs::remove_dir_all(out).unwrap();
+    }
+}
+
+/// A share that was not run is noticed; nothing is measured instead of it unless that is wanted.
+#[test]
+fn a_missing_share_is_an_error() {
+    let [first, gathered] = ["lonely", "incomplete"].map(folder);
+    let measured = Rc::new(Counter::new(0));
+    squares(&measured)
+        .run(&arguments(first.clone(), Some("1/2")))
+        .unwrap();
+    measured.set(0);
+    let merged = merge(&MergeArguments::of(gathered.clone(), vec![first.clone()]));
+    let mut arguments = merged.unwrap().remove(0).1;
+    let error = squares(&measured).run(&arguments).unwrap_err().to_string();
+    assert!(
+        error.contains("3 of 7 cells are missing") && error.contains("square-1"),
+        "{error}"
+    );
+    assert!(error.contains("--partial"), "{error}");
+    assert_eq!(measured.get(), 0);
+    assert!(!gathered.join("squares.md").exists());
+    arguments.complete = false;
+    squares(&measured).run(&arguments).unwrap();
+    assert_eq!(measured.get(), 3);
+    for out in [first, gathered] {
         fs::remove_dir_all(out).unwrap();
     }
 }

@@ -27,6 +27,7 @@ impl Folder {
             backend: Backend::Cpu,
             out,
             shard: None,
+            complete: false,
         })
     }
 

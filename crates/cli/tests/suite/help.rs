@@ -9,6 +9,7 @@ fn every_help_has_an_example() {
         &[][..],
         &["run"],
         &["advise"],
+        &["sweep"],
         &["color"],
         &["mesh"],
         &["mesh", "info"],

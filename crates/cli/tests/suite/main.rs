@@ -16,3 +16,4 @@ mod run;
 mod run_files;
 mod scene;
 mod support;
+mod sweep;
