@@ -19,6 +19,8 @@ mod share;
 mod summary;
 mod sweep;
 
+#[cfg(all(unix, feature = "gpu"))]
+use std::ffi::OsString;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -30,6 +32,8 @@ use failure::Failure;
 use print::print;
 
 fn main() -> ExitCode {
+    #[cfg(all(unix, feature = "gpu"))]
+    with_socket_folder();
     let arguments = Arguments::try_parse().unwrap_or_else(|error| with_tip(error).exit());
     let result = match arguments.command {
         None => run::run(&args::RunArguments::default()),
@@ -50,6 +54,33 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => failure.report(),
     }
+}
+
+/// Replaces this process by one with a folder for sockets, if there is none: without it, libraries of GPU drivers complain
+/// on stderr. A process cannot change its own environment safely once libraries may read it.
+#[cfg(all(unix, feature = "gpu"))]
+fn with_socket_folder() {
+    use std::os::unix::process::CommandExt;
+
+    const FOLDER: &str = "XDG_RUNTIME_DIR";
+    let is_set = |folder: OsString| Path::new(&folder).is_absolute();
+    let Ok(program) = std::env::current_exe() else {
+        return;
+    };
+    let mut arguments = std::env::args_os();
+    let (Some(name), false) = (
+        arguments.next(),
+        std::env::var_os(FOLDER).is_some_and(is_set),
+    ) else {
+        return;
+    };
+    let mut again = std::process::Command::new(program);
+    again
+        .arg0(name)
+        .args(arguments)
+        .env(FOLDER, std::env::temp_dir());
+    // Returns only if it fails; then the messages stay.
+    let _ = again.exec();
 }
 
 /// Writes the manual pages.

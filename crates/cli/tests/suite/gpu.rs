@@ -129,3 +129,27 @@ fn colorings_on_a_gpu_are_those_of_the_processor() {
         refused.stderr
     );
 }
+
+/// Libraries of GPU drivers complain on stderr without a folder for sockets.
+#[test]
+#[cfg(target_os = "linux")]
+fn nothing_is_on_stderr_without_a_folder_for_sockets() {
+    let sandbox = Sandbox::with_scene();
+    for folder in [None, Some(""), Some("relative")] {
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_incise"));
+        command.env_remove("XDG_RUNTIME_DIR");
+        if let Some(folder) = folder {
+            command.env("XDG_RUNTIME_DIR", folder);
+        }
+        let run = "run scene.toml --frames 1 --backend gpu --no-pictures";
+        let output = command.args(run.split(' ')).current_dir(sandbox.path("."));
+        let output = output.output().unwrap();
+        let stderr = String::from_utf8(output.stderr).unwrap();
+        let code = output.status.code().unwrap();
+        let test = "nothing_is_on_stderr_without_a_folder_for_sockets";
+        if !has_gpu(test, &stderr, code) {
+            return;
+        }
+        assert_eq!(stderr, "", "{folder:?}");
+    }
+}

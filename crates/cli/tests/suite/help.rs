@@ -60,6 +60,40 @@ fn shells_complete_commands_and_options() {
     }
 }
 
+/// The package has manual pages and completions as files, and they are those of this program.
+#[test]
+fn pages_and_completions_of_the_package_are_current() {
+    let sandbox = Sandbox::new();
+    let package = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let read = |path: std::path::PathBuf| std::fs::read_to_string(path).unwrap_or_default();
+    std::fs::create_dir(sandbox.path("man")).unwrap();
+    sandbox.good(&["man", "man"]);
+    for name in sandbox.names("man") {
+        assert!(
+            sandbox.read(&format!("man/{name}")) == read(package.join("man").join(&name)),
+            "{name} is not current: cargo run -p incise-cli -- man crates/cli/man"
+        );
+    }
+    let kept = std::fs::read_dir(package.join("man")).unwrap().count();
+    assert_eq!(
+        kept,
+        sandbox.names("man").len(),
+        "a page of a former command is left in crates/cli/man"
+    );
+    for (shell, name) in [
+        ("bash", "incise.bash"),
+        ("elvish", "incise.elv"),
+        ("fish", "incise.fish"),
+        ("powershell", "_incise.ps1"),
+        ("zsh", "_incise"),
+    ] {
+        assert!(
+            sandbox.good(&["completions", shell]) == read(package.join("completions").join(name)),
+            "{name} is not current: cargo run -p incise-cli -- completions {shell} > crates/cli/completions/{name}"
+        );
+    }
+}
+
 #[test]
 fn every_command_has_a_manual_page() {
     let sandbox = Sandbox::new();
