@@ -6,6 +6,11 @@
 //!
 //! Cost: a copy of the arrays that are passed.
 
+#![allow(
+    clippy::doc_markdown,
+    reason = "doc comments are Python's docstrings, in the format of numpydoc"
+)]
+
 mod array;
 mod body;
 mod failure;

@@ -214,7 +214,7 @@ fn wrap(mesh: &Bound<'_, PyAny>) -> PyResult<Mesh> {
     else {
         let kind = mesh.get_type().name()?;
         return Err(PyTypeError::new_err(format!(
-            "a {kind} is no mesh: give an incise.Mesh, a pair (points, tets), the path of a file, or a mesh with `points` \
+            "{kind} is no mesh: give an incise.Mesh, a pair (points, tets), the path of a file, or a mesh with `points` \
              and `cells_dict` (meshio, PyVista)"
         )));
     };

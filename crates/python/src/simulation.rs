@@ -8,7 +8,7 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use incise::mesh::glam::{DQuat, DVec3, DVec4};
+use incise::mesh::glam::{DQuat, DVec3};
 use incise::report::{ContactForce, Force};
 use incise::scene::{Region, SolidBladeSpec, StrokeSpec};
 use incise::{BodyHandle, Event, SimulationBuilder};
@@ -555,7 +555,6 @@ impl Simulation {
     /// ``solid`` gives the blade a body that pushes the sides apart: ``{"thickness": 0.002, "wedge_angle_degrees": 20,
     /// "height": 0.1}``.
     #[pyo3(signature = (blade, path, frames, *, snap=0.1, solid=None))]
-    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn cut_sweep(
         &self,
         py: Python<'_>,
@@ -867,17 +866,18 @@ impl Simulation {
     }
 
     /// Moves an attachment during the next frame: its particles as they were attached, rotated about their center by the
-    /// unit quaternion ``rotation`` (x, y, z, w), then displaced by ``offset`` in m.
-    #[pyo3(signature = (attachment, offset, *, rotation=(0.0, 0.0, 0.0, 1.0)))]
+    /// unit quaternion ``rotation`` (x, y, z, w), if any, then displaced by ``offset`` in m.
+    #[pyo3(signature = (attachment, offset, *, rotation=None))]
     fn move_attachment(
         &self,
         py: Python<'_>,
         attachment: Attachment,
         offset: &Bound<'_, PyAny>,
-        rotation: (f64, f64, f64, f64),
+        rotation: Option<(f64, f64, f64, f64)>,
     ) -> PyResult<()> {
         let offset = vector("offset", offset)?;
-        let rotation = DQuat::from_vec4(DVec4::from(rotation));
+        let rotation =
+            rotation.map_or(DQuat::IDENTITY, |(x, y, z, w)| DQuat::from_xyzw(x, y, z, w));
         self.try_with(py, |simulation| {
             simulation.move_attachment(attachment.0, offset, rotation)
         })

@@ -165,7 +165,7 @@ def test_meshes_of_other_packages(bar):
     flat = types.SimpleNamespace(points=points, cells_dict={"triangle": tets[:, :3]})
     with pytest.raises(ValueError, match="no tets, only cells of type triangle"):
         incise.Body(flat)
-    with pytest.raises(TypeError, match="a int is no mesh"):
+    with pytest.raises(TypeError, match="int is no mesh"):
         incise.Body(3)
 
 

@@ -5,6 +5,8 @@ import doctest
 import inspect
 from pathlib import Path
 
+import pytest
+
 import incise
 
 STUBS = Path(incise.__file__).with_name("__init__.pyi")
@@ -56,8 +58,8 @@ def test_stubs_and_module_agree():
         kind = getattr(incise, name)
         members = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
         assert public(members) == public(kind.__dict__), name
-        if "__init__" in members:
-            assert parameters(members["__init__"]) == present(kind), name
+        if "__new__" in members:
+            assert parameters(members["__new__"]) == present(kind), name
         for member, node in members.items():
             decorators = {getattr(d, "id", None) for d in node.decorator_list}
             if member.startswith("_") or "property" in decorators:
@@ -83,3 +85,16 @@ def test_the_example_of_the_module_runs():
     parsed = doctest.DocTestParser().get_doctest(incise.__doc__, {}, "incise", None, 0)
     assert len(parsed.examples) == 5
     assert doctest.DocTestRunner().run(parsed).failed == 0
+
+
+@pytest.mark.parametrize("page", ["README.md", "../../README.md"])
+def test_the_examples_of_the_pages_run(page, capsys):
+    path = Path(__file__).parents[1] / page
+    blocks = [block.split("```")[0] for block in path.read_text().split("```python\n")[1:]]
+    assert blocks
+    for block in blocks:
+        names = {}
+        exec(block, names)
+        if "sim" in names:
+            assert names["sim"].report["pieces"] == 2
+    assert capsys.readouterr().out
