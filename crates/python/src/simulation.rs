@@ -560,11 +560,16 @@ impl Simulation {
         py: Python<'_>,
         blade: &Bound<'_, PyAny>,
         path: &Bound<'_, PyAny>,
-        frames: [u64; 2],
+        frames: &Bound<'_, PyAny>,
         snap: f64,
         solid: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<()> {
         let (blade, path) = (triples("blade", blade)?, triples("path", path)?);
+        let frames: [u64; 2] = frames.extract().map_err(|_| {
+            PyValueError::new_err(
+                "frames must be a pair of whole numbers: the first and the last frame",
+            )
+        })?;
         let solid = solid.map(solid_blade).transpose()?.flatten();
         let stroke = match solid {
             Some(solid) => StrokeSpec::solid_sweep(frames, blade, path, solid),

@@ -114,6 +114,9 @@ def test_bad_values_have_their_key(bar):
         sim.cut_plane((0, 0, 0), (0, 0, 0))
     with pytest.raises(ValueError, match=r"triangles\[0, 2\] is 3"):
         sim.cut_triangles([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 3]])
+    for frames in [(3,), (-1, 4), "ab", 3]:
+        with pytest.raises(ValueError, match="frames must be a pair"):
+            sim.cut_sweep([[0, 0, 0], [0, 1, 0]], [[0, 0, 0], [0, 0, 1]], frames)
     with pytest.raises(ValueError, match="blade"):
         sim.begin_stroke([[0, 0, 0]])
     with pytest.raises(ValueError, match="`spher`"):

@@ -3,6 +3,7 @@
 import ast
 import doctest
 import inspect
+import sys
 from pathlib import Path
 
 import pytest
@@ -58,7 +59,8 @@ def test_stubs_and_module_agree():
         kind = getattr(incise, name)
         members = {node.name: node for node in stub.body if isinstance(node, ast.FunctionDef)}
         assert public(members) == public(kind.__dict__), name
-        if "__new__" in members:
+        # Python 3.9 has no signatures of constructors.
+        if "__new__" in members and sys.version_info >= (3, 10):
             assert parameters(members["__new__"]) == present(kind), name
         for member, node in members.items():
             decorators = {getattr(d, "id", None) for d in node.decorator_list}
