@@ -13,6 +13,7 @@
 
 mod array;
 mod body;
+mod compute;
 mod failure;
 mod handles;
 mod mesh;

@@ -13,6 +13,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyString, PyTuple, PyType};
 
 use crate::array;
+use crate::compute::compute;
 use crate::failure::{invalid, refused_file};
 
 /// A tetrahedral mesh at rest.
@@ -85,14 +86,14 @@ impl Mesh {
     #[staticmethod]
     #[pyo3(signature = (path, /))]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let mesh = py.detach(|| mesh_io::read(path));
+        let mesh = compute(py, || mesh_io::read(path))?;
         mesh.map(Self::new).map_err(|error| refused_file(&error))
     }
 
     /// Writes a file; the format is that of its ending, as in ``load``, or a surface as ``.obj``, ``.stl`` or ``.ply``.
     #[pyo3(signature = (path, /))]
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let written = py.detach(|| mesh_io::write(path, &self.mesh));
+        let written = compute(py, || mesh_io::write(path, &self.mesh))?;
         written.map_err(|error| refused_file(&error))
     }
 
@@ -101,7 +102,7 @@ impl Mesh {
     #[staticmethod]
     #[pyo3(signature = (shape, tets))]
     fn generate(py: Python<'_>, shape: &str, tets: usize) -> PyResult<Self> {
-        let mesh = py.detach(|| meshing::generate(Shape::from_name(shape)?, tets));
+        let mesh = compute(py, || meshing::generate(Shape::from_name(shape)?, tets))?;
         mesh.map(Self::new).map_err(|error| unmeshed(&error))
     }
 
@@ -125,7 +126,9 @@ impl Mesh {
             positions,
             triangles,
         };
-        let mesh = py.detach(|| meshing::tetrahedralize(&Solid::new(&surface)?, tets, 0));
+        let mesh = compute(py, || {
+            meshing::tetrahedralize(&Solid::new(&surface)?, tets, 0)
+        })?;
         mesh.map(Self::new).map_err(|error| unmeshed(&error))
     }
 
@@ -150,21 +153,22 @@ impl Mesh {
     /// Numbers of the three points of each boundary triangle, counterclockwise seen from outside, shape (t, 3), int64.
     fn surface<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         // It sorts the faces of tets, whose corners exist.
-        let surface = py.detach(|| self.mesh.surface());
+        let surface = compute(py, || self.mesh.surface())?;
         array::from_rows(py, surface.triangles.iter().map(|t| t.map(|p| p.0)))
     }
 
     /// Raises ``ValueError`` with the first fault unless the mesh can be simulated: finite points, tets of positive volume,
     /// no overlapping tets. Setting up a simulation checks this, too.
     fn check(&self, py: Python<'_>) -> PyResult<()> {
-        let checked = py.detach(|| self.mesh.check());
+        let checked = compute(py, || self.mesh.check())?;
         checked.map_err(|error| invalid(&error))
     }
 
     /// A mesh without the faults that ``check`` names: coincident points merged, inverted tets flipped, flat and duplicate
     /// tets, unused points and all pieces but the largest removed.
-    fn repair(&self, py: Python<'_>) -> Self {
-        Self::new(py.detach(|| repair(&self.mesh, &RepairOptions::ALL)).mesh)
+    fn repair(&self, py: Python<'_>) -> PyResult<Self> {
+        let repaired = compute(py, || repair(&self.mesh, &RepairOptions::ALL))?;
+        Ok(Self::new(repaired.mesh))
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, Parts<'py>)> {

@@ -10,6 +10,7 @@ use incise::scene::location;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
+use crate::compute::compute;
 use crate::failure::{failed, invalid, refused, refused_at};
 use crate::value::{from_serde, from_toml, scene_of, table};
 
@@ -105,7 +106,7 @@ pub(crate) fn advise<'py>(
     let frames = frames.unwrap_or_else(|| default_frames(&source.scene));
     let mut question = AdviseSettings::new(budget_ms, frames);
     question.threads = threads;
-    let advice = py.detach(|| search(&source.scene, &question));
+    let advice = compute(py, || search(&source.scene, &question))?;
     let advice = advice.map_err(|error| source.refused(&error))?;
     let result = from_serde(py, &advice)?;
     for measured in result.get_item("measured")?.try_iter()? {

@@ -14,6 +14,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyList, PyTuple};
 
 use crate::array;
+use crate::compute::compute;
 use crate::failure::{failed, invalid, sentence};
 
 /// The largest number of particles that the arrays may name.
@@ -237,7 +238,7 @@ pub(crate) fn color(
             coloring_suggestion(&error)
         ))
     })?;
-    py.detach(|| {
+    compute(py, || {
         let colored = color_constraints(algorithm, &incidence, seed);
         let mut colored = colored.map_err(|error| failed(&error))?;
         if balance {
@@ -251,7 +252,7 @@ pub(crate) fn color(
             bound: incidence.clique_bound(),
             rounds: colored.rounds,
         })
-    })
+    })?
 }
 
 /// Merges neighboring constraints into clusters, which need fewer colors.
@@ -283,12 +284,12 @@ pub(crate) fn cluster(
             clustering_suggestion(&error)
         ))
     })?;
-    Ok(py.detach(|| {
+    compute(py, || {
         let clustering = cluster_constraints(method, &incidence);
         let quotient = incidence.quotient(&clustering);
         Clustering {
             clustering,
             quotient,
         }
-    }))
+    })
 }

@@ -19,6 +19,7 @@ use toml::{Table, Value};
 
 use crate::array::{self, vector, vectors};
 use crate::body::Body;
+use crate::compute::compute;
 use crate::failure::{failed, refused};
 use crate::handles::{Attachment, Collider, Distance, Grab};
 use crate::mesh::Mesh;
@@ -99,21 +100,21 @@ impl Simulation {
     fn with<R: Send>(
         &self,
         py: Python<'_>,
-        compute: impl FnOnce(&mut State) -> R + Send,
+        change: impl FnOnce(&mut State) -> R + Send,
     ) -> PyResult<R> {
-        py.detach(|| match self.state.lock() {
-            Ok(mut state) => Ok(compute(&mut state)),
+        compute(py, || match self.state.lock() {
+            Ok(mut state) => Ok(change(&mut state)),
             Err(poisoned) => Err(lost(poisoned)),
-        })
+        })?
     }
 
     /// `with` for what the facade may refuse.
     fn try_with<R: Send>(
         &self,
         py: Python<'_>,
-        compute: impl FnOnce(&mut incise::Simulation) -> Result<R, incise::Error> + Send,
+        change: impl FnOnce(&mut incise::Simulation) -> Result<R, incise::Error> + Send,
     ) -> PyResult<R> {
-        let result = self.with(py, |state| compute(&mut state.simulation))?;
+        let result = self.with(py, |state| change(&mut state.simulation))?;
         result.map_err(|error| refused(&error))
     }
 }
@@ -203,11 +204,11 @@ fn build(
     py: Python<'_>,
     mut builder: SimulationBuilder,
     threads: Option<usize>,
-) -> Result<Simulation, incise::Error> {
+) -> PyResult<Result<Simulation, incise::Error>> {
     if let Some(threads) = threads {
         builder.threads(threads);
     }
-    py.detach(|| builder.build()).map(Simulation::new)
+    Ok(compute(py, || builder.build())?.map(Simulation::new))
 }
 
 /// A region for cuts, as a dictionary with the keys of a scene.
@@ -294,7 +295,7 @@ impl Simulation {
         for body in Body::from_argument(bodies)? {
             builder.add_body(body);
         }
-        build(py, builder, threads).map_err(|error| refused(&error))
+        build(py, builder, threads)?.map_err(|error| refused(&error))
     }
 
     /// A simulation of a scene: the path of a scene file, or a dict with its keys. Files of meshes are relative to the scene
@@ -311,7 +312,7 @@ impl Simulation {
     ) -> PyResult<Self> {
         let source = Source::from_argument(scene)?;
         let builder = SimulationBuilder::from_scene(source.scene.clone());
-        build(py, builder, threads).map_err(|error| source.refused(&error))
+        build(py, builder, threads)?.map_err(|error| source.refused(&error))
     }
 
     /// A simulation of the text of a scene file.
@@ -325,7 +326,7 @@ impl Simulation {
     ) -> PyResult<Self> {
         let scene = incise::Scene::from_toml(text).map_err(|error| refused(&error))?;
         let builder = SimulationBuilder::from_scene(scene);
-        build(py, builder, threads).map_err(|error| refused(&error))
+        build(py, builder, threads)?.map_err(|error| refused(&error))
     }
 
     /// A simulation that continues from a snapshot bit-identically, on the threads of the process.
@@ -337,7 +338,7 @@ impl Simulation {
         snapshot: &Bound<'_, Snapshot>,
     ) -> PyResult<Self> {
         let snapshot = snapshot.get();
-        let simulation = py.detach(|| incise::Simulation::from_snapshot(&snapshot.0));
+        let simulation = compute(py, || incise::Simulation::from_snapshot(&snapshot.0))?;
         simulation.map(Self::new).map_err(|error| refused(&error))
     }
 

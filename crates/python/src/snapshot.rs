@@ -8,6 +8,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyType};
 
+use crate::compute::compute;
 use crate::failure::failed;
 
 /// What the bytes of a snapshot begin with.
@@ -40,7 +41,7 @@ impl Snapshot {
                 "of the snapshot are damaged: the checksum differs".to_owned(),
             ));
         }
-        let read = py.detach(|| postcard::from_bytes(state));
+        let read = compute(py, || postcard::from_bytes(state))?;
         read.map(Self).map_err(|error| {
             let version = env!("CARGO_PKG_VERSION");
             refuse(format!(
@@ -50,7 +51,7 @@ impl Snapshot {
     }
 
     fn __bytes__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        let state = py.detach(|| postcard::to_stdvec(&self.0));
+        let state = compute(py, || postcard::to_stdvec(&self.0))?;
         let state = state.map_err(|error| failed(&error))?;
         let sum = crc32fast::hash(&state).to_le_bytes();
         let parts = [&MARK[..], &sum, &state];

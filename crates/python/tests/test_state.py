@@ -1,9 +1,11 @@
 """Snapshots, pickles, threads, and the surface that follows cuts."""
 
 import copy
+import multiprocessing
 import pickle
 import threading
 import time
+import warnings
 
 import numpy as np
 import pytest
@@ -124,6 +126,27 @@ def test_calls_from_several_threads_wait_for_each_other(bar):
     alone = incise.Simulation(incise.Body(bar), gravity=G)
     alone.run(40)
     assert same(sim, alone)
+
+
+def in_child(mesh):
+    """What a process of a pool does: a frame, or the error."""
+    try:
+        return incise.Simulation(incise.Body(mesh)).step()["tets"]
+    except RuntimeError as error:
+        return str(error)
+
+
+def test_processes(bar):
+    mesh = incise.Mesh(*bar)
+    incise.Simulation(incise.Body(mesh)).step()
+    for method in multiprocessing.get_all_start_methods():
+        with warnings.catch_warnings():
+            # Python warns of forks of a process with threads.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            with multiprocessing.get_context(method).Pool(1) as pool:
+                result = pool.apply_async(in_child, (mesh,)).get(timeout=60)
+        # Only a forked process lacks the threads that have been started, and says so in place of waiting for them.
+        assert "spawn" in result if method == "fork" else result == len(mesh.tets), method
 
 
 def within(ranges, count):
