@@ -26,6 +26,7 @@ mod sweep;
 #[cfg(test)]
 mod tidy;
 mod viewer;
+mod web;
 
 use anyhow::Context;
 use clap::{Parser, Subcommand};
@@ -126,6 +127,8 @@ enum Command {
     Accuracy(ExperimentArguments),
     /// Test the viewer with synthetic input on a virtual screen (needs Xvfb).
     ViewerSmoke(viewer::SmokeArguments),
+    /// Build the viewer as a web page, test it in Chromium, serve it.
+    Web(web::WebArguments),
     /// Cut a mesh with many small strokes, and measure clusters, colors and the solve time.
     Degradation(degradation::DegradationArguments),
 }
@@ -151,6 +154,7 @@ fn main() -> anyhow::Result<()> {
         Command::Sweep(arguments) => sweep::sweep(&arguments),
         Command::Accuracy(arguments) => accuracy::accuracy(&arguments),
         Command::ViewerSmoke(arguments) => viewer::smoke(&arguments),
+        Command::Web(arguments) => web::web(&arguments),
         Command::Degradation(arguments) => degradation::degradation(&arguments),
     }
 }

@@ -256,20 +256,17 @@ fn buffer(
     if bytes > limit {
         return Err(GpuError::TooLarge { what, bytes, limit });
     }
-    let memory = gpu
-        .device()
-        .push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    let buffer = gpu.device().create_buffer(&wgpu::BufferDescriptor {
-        label: Some(what),
-        size: bytes
-            .max(SMALLEST)
-            .next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
-        usage,
-        mapped_at_creation: false,
+    let created = gpu.guarded(wgpu::ErrorFilter::OutOfMemory, |device| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            size: bytes
+                .max(SMALLEST)
+                .next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+            usage,
+            mapped_at_creation: false,
+        })
     });
-    if pollster::block_on(memory.pop()).is_some() {
-        return Err(GpuError::OutOfMemory { what, bytes });
-    }
+    let buffer = created.map_err(|_| GpuError::OutOfMemory { what, bytes })?;
     count(&gpu.counters().buffers, 1);
     Ok(buffer)
 }

@@ -85,6 +85,8 @@ const SPARES: usize = 16;
 impl GpuContext {
     /// Opens the adapter that matches the options best.
     ///
+    /// A browser opens devices asynchronously: pass an opened one to [`GpuContext::from_device`].
+    ///
     /// Kernels stay within WebGPU's default limits except for the size of buffers, of which the device's maximum is
     /// requested.
     ///
@@ -210,6 +212,28 @@ impl GpuContext {
         &self.counters
     }
 
+    /// Creates a resource and returns it, or the error that the driver reports about it.
+    ///
+    /// In a browser, which cannot be waited for, the error is returned by a later [`GpuContext::check`].
+    ///
+    /// # Errors
+    /// An error of this kind, reported while the resource was created.
+    pub fn guarded<T>(
+        &self,
+        kind: wgpu::ErrorFilter,
+        create: impl FnOnce(&Device) -> T,
+    ) -> Result<T, wgpu::Error> {
+        if cfg!(target_family = "wasm") {
+            return Ok(create(&self.device));
+        }
+        let scope = self.device.push_error_scope(kind);
+        let created = create(&self.device);
+        match block_on(scope.pop()) {
+            Some(error) => Err(error),
+            None => Ok(created),
+        }
+    }
+
     /// Returns an error that the driver has reported since; from then on, results of the device are undefined.
     ///
     /// # Errors
@@ -300,6 +324,9 @@ fn enumerate(options: &GpuOptions) -> Vec<Adapter> {
             .with_env(),
         ..wgpu::InstanceDescriptor::new_without_display_handle()
     });
+    if cfg!(target_family = "wasm") {
+        return Vec::new();
+    }
     let mut adapters = block_on(instance.enumerate_adapters(backends));
     // The sort is stable, so adapters of one kind stay in the driver's order.
     adapters.sort_by_key(|adapter| match adapter.get_info().device_type {
@@ -312,6 +339,13 @@ fn enumerate(options: &GpuOptions) -> Vec<Adapter> {
     adapters
 }
 
+/// What is found where no adapter is.
+const NO_ADAPTER: &str = if cfg!(target_family = "wasm") {
+    "none (a browser opens a device asynchronously)"
+} else {
+    "none (is a driver installed?)"
+};
+
 fn choose(options: &GpuOptions) -> Result<Adapter, GpuError> {
     let adapters = enumerate(options);
     let names: Vec<String> = adapters.iter().map(|a| a.get_info().name).collect();
@@ -322,7 +356,7 @@ fn choose(options: &GpuOptions) -> Result<Adapter, GpuError> {
     };
     let place = names.iter().position(fits);
     let found = if names.is_empty() {
-        "none (is a driver installed?)".to_owned()
+        NO_ADAPTER.to_owned()
     } else {
         names.join(", ")
     };

@@ -49,51 +49,49 @@ impl Kernel {
         uses: &[BindingKind],
         constants: &[(&str, f64)],
     ) -> Result<Self, GpuError> {
-        let device = gpu.device();
-        let refused = device.push_error_scope(wgpu::ErrorFilter::Validation);
-        let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
-            label: Some(name),
-            source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
-        });
-        let entries: Vec<_> = (0..)
-            .zip(uses)
-            .map(|(binding, &usage)| wgpu::BindGroupLayoutEntry {
-                binding,
-                visibility: wgpu::ShaderStages::COMPUTE,
-                ty: binding_type(usage),
-                count: None,
-            })
-            .collect();
-        let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-            label: Some(name),
-            entries: &entries,
-        });
-        let all = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some(name),
-            bind_group_layouts: &[Some(&layout)],
-            immediate_size: 0,
-        });
-        let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
-            label: Some(name),
-            layout: Some(&all),
-            module: &module,
-            entry_point: Some("main"),
-            compilation_options: wgpu::PipelineCompilationOptions {
-                constants,
-                ..wgpu::PipelineCompilationOptions::default()
-            },
-            cache: None,
-        });
-        match pollster::block_on(refused.pop()) {
-            Some(error) => Err(GpuError::Command {
-                message: format!("{name}: {error}"),
-            }),
-            None => Ok(Self {
+        let created = gpu.guarded(wgpu::ErrorFilter::Validation, |device| {
+            let module = device.create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some(name),
+                source: wgpu::ShaderSource::Wgsl(parts.concat().into()),
+            });
+            let entries: Vec<_> = (0..)
+                .zip(uses)
+                .map(|(binding, &usage)| wgpu::BindGroupLayoutEntry {
+                    binding,
+                    visibility: wgpu::ShaderStages::COMPUTE,
+                    ty: binding_type(usage),
+                    count: None,
+                })
+                .collect();
+            let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+                label: Some(name),
+                entries: &entries,
+            });
+            let all = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some(name),
+                bind_group_layouts: &[Some(&layout)],
+                immediate_size: 0,
+            });
+            let pipeline = device.create_compute_pipeline(&wgpu::ComputePipelineDescriptor {
+                label: Some(name),
+                layout: Some(&all),
+                module: &module,
+                entry_point: Some("main"),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants,
+                    ..wgpu::PipelineCompilationOptions::default()
+                },
+                cache: None,
+            });
+            Self {
                 pipeline,
                 layout,
                 uses: uses.to_vec(),
-            }),
-        }
+            }
+        });
+        created.map_err(|error| GpuError::Command {
+            message: format!("{name}: {error}"),
+        })
     }
 
     /// Binds buffers in the order of the shader's binding numbers.

@@ -15,6 +15,19 @@ use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
 use crate::validate::{coordinates, value, within};
 
+/// What supports a particle.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Support {
+    /// Nothing: the solver moves it.
+    #[default]
+    Free,
+    /// It is pinned where it was at the start.
+    Pinned,
+    /// An attachment or a grab.
+    Attached,
+}
+
 /// Handle of an attachment of a simulation, valid until the attachment is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]

@@ -4,13 +4,13 @@
 //! of `incise-xpbd` share are written once, for either precision, with `each!` and `each_mut!`.
 
 use std::ops::Range;
-use std::time::Instant;
 
 use glam::{DMat3, DVec3};
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
 use incise_xpbd::{Forces, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
+use web_time::Instant;
 
 use crate::Error;
 use crate::compute_device::ComputeDevice;

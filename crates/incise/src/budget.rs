@@ -6,9 +6,8 @@
 //! reduced if they no longer fit. The choice depends on measured times, so results differ from run to run. Cost: a few
 //! frames at the start.
 
-use std::time::Instant;
-
 use incise_xpbd::StepSettings;
+use web_time::Instant;
 
 use crate::Error;
 use crate::backend::AnySolver;

@@ -12,8 +12,6 @@
 //! Source: `incise-contact` and `incise-xpbd`. Cost: that of a detector, about 40 ns a contact to color when the list
 //! changes, and a pass over the contacts after the frame.
 
-use std::time::Instant;
-
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
 use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
@@ -21,6 +19,7 @@ use incise_cutting::{CutDelta, CuttableMesh, PieceTracker};
 use incise_graph::{Coloring, Incidence};
 use incise_mesh::{ParticleId, closest_on_triangle};
 use incise_xpbd::{ContactLaw, EdgeContact, FaceContact, FaceLimit, PairContact, SurfaceContact};
+use web_time::Instant;
 
 use crate::backend::{AnySolver, each, each_mut};
 use crate::report::{ContactCounts, milliseconds};

@@ -5,13 +5,13 @@
 
 use std::ops::Range;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use incise_clustering::Method;
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
 use incise_xpbd::{Forces, Pose, Solver, StepReport, StepSettings};
+use web_time::Instant;
 
 use crate::Error;
 use crate::report::{Milliseconds, milliseconds};

@@ -7,7 +7,6 @@ mod join;
 mod judged;
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{
@@ -16,6 +15,7 @@ use incise_cutting::{
 };
 use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
 use incise_xpbd::{DistanceConstraint, KappaLimit, SolidBlade, StepReport, StepSettings};
+use web_time::Instant;
 
 pub(crate) use self::judged::Budget;
 use self::judged::{Judged, accuracy_data};

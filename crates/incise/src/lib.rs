@@ -69,7 +69,7 @@ mod vbd;
 mod volume;
 mod warning;
 
-pub use attachment::AttachmentHandle;
+pub use attachment::{AttachmentHandle, Support};
 pub use collider::ColliderHandle;
 pub use distance::DistanceHandle;
 pub use error::{Error, clustering_suggestion, coloring_suggestion, shape_suggestion};

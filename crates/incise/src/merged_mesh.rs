@@ -264,7 +264,6 @@ impl MergedMesh {
     }
 
     /// The number of an island's particle.
-    #[cfg(feature = "advise")]
     pub(crate) fn particle(&self, island: usize, particle: usize) -> usize {
         self.numbers[island].particles[particle].index()
     }

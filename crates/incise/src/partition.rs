@@ -1,13 +1,13 @@
 //! [`Partition`]: clusters, colors and the schedule of a simulation, and their local update after a cut.
 
 use std::num::NonZeroUsize;
-use std::time::Instant;
 
 use incise_clustering::{MergeLists, Method, cluster, merge_small, update_local};
 use incise_coloring::{Algorithm, Recoloring, color};
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::{ClusterId, Clustering, Coloring, Incidence, Schedule};
 use incise_mesh::{TetId, TetMesh};
+use web_time::Instant;
 
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::SolverSpec;

@@ -128,6 +128,14 @@ impl Pending {
             message,
         };
         let mesh = cuttable.mesh().clone();
+        if cfg!(target_family = "wasm") {
+            // There are no threads.
+            return Ok(Self {
+                due,
+                rebuild: Rebuild::Done(Box::new(Partition::of(settings, &mesh)?)),
+                deltas: Vec::new(),
+            });
+        }
         // A pool of its own: the caller's may be the one that waits.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| refused(error.to_string()))?;

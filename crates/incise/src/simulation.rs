@@ -14,7 +14,6 @@ mod state;
 
 use std::borrow::Cow;
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta};
@@ -22,7 +21,10 @@ use incise_graph::{Clustering, Coloring, Schedule};
 use incise_mesh::{Surface, TetMesh};
 use rayon::ThreadPool;
 use rayon::prelude::*;
+use web_time::Instant;
 
+use crate::attachment::Support;
+use crate::backend::each;
 use crate::budget;
 use crate::collider::Colliders;
 use crate::compute_device::{ComputeDevice, OpenDevice};
@@ -235,7 +237,6 @@ impl Simulation {
     }
 
     /// The number in the merged mesh of a particle of an island.
-    #[cfg(feature = "advise")]
     pub(crate) fn particle(&self, island: usize, particle: usize) -> usize {
         match &self.state.dependents.merged {
             Some(merged) => merged.particle(island, particle),
@@ -557,6 +558,40 @@ impl Simulation {
     #[must_use]
     pub fn surface(&self) -> Surface {
         self.mesh().surface()
+    }
+
+    /// Returns for each particle what supports it, in the numbers of [`Simulation::mesh`]. O(particles).
+    ///
+    /// # Example
+    /// ```
+    /// use incise::meshing::{Shape, generate};
+    /// use incise::{Body, Simulation, Support};
+    ///
+    /// let mut builder = Simulation::builder();
+    /// builder.add_body(Body::new(generate(Shape::Beam, 300)?).pinned(|x| x.x < -0.45));
+    /// let simulation = builder.build()?;
+    /// let is_pinned = |x: f64| if x < -0.45 { Support::Pinned } else { Support::Free };
+    /// for (x, support) in simulation.mesh().positions.iter().zip(simulation.supports()) {
+    ///     assert_eq!(support, is_pinned(x.x));
+    /// }
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn supports(&self) -> Vec<Support> {
+        let mut supports = vec![Support::Free; self.mesh().positions.len()];
+        for (g, island) in self.state.islands.iter().enumerate() {
+            each!(&island.solver, solver => {
+                for p in 0..solver.particle_count() {
+                    let support = match (solver.is_fixed(p), solver.handle_of(p)) {
+                        (true, _) => Support::Pinned,
+                        (false, Some(_)) => Support::Attached,
+                        (false, None) => continue,
+                    };
+                    supports[self.particle(g, p)] = support;
+                }
+            });
+        }
+        supports
     }
 
     /// Returns the events of the last frame: cuts that began, pieces that were detached, cuts that ended; then contacts

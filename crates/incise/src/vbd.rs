@@ -5,14 +5,13 @@
 //! color, are colored again. Cost: O(tets) after each cut, since the stars of all particles are rebuilt and all tets
 //! are checked.
 
-use std::time::Instant;
-
 use incise_coloring::auto;
 use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
 use incise_xpbd::{
     CoarseCorrection, CoarseCorrectionSettings, Integrator, Real, Solver, StepReport, StepSettings,
     VbdReport, VertexStars,
 };
+use web_time::Instant;
 
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::SolverSpec;

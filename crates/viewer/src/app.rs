@@ -5,21 +5,24 @@
 
 use std::path::Path;
 use std::sync::Arc;
-use std::time::Instant;
 
 use eframe::egui::{
     self, Align2, CentralPanel, Color32, Context, Frame, Panel, PointerButton, Pos2, Rect,
-    Response, Sense, Stroke, Ui, Window,
+    Response, Sense, Shape, Stroke, Ui, Window,
 };
+use incise::Support;
 use incise::gpu::GpuContext;
+use incise::mesh::glam::DVec3;
 use incise::scene::Backend;
 use incise_render::{ColorBy, Style};
+use web_time::Instant;
 
 use crate::canvas::Canvas;
 use crate::frame_clock::FrameClock;
 use crate::graphics;
 use crate::help::{self, Action};
 use crate::load::{Loading, Source};
+use crate::open_dialog::OpenDialog;
 use crate::panel::{self, Controls, UiCommands};
 use crate::session::Session;
 use crate::tool::Tool;
@@ -50,9 +53,13 @@ pub(crate) struct Viewer {
     notes: Vec<String>,
     session: Option<Session>,
     loading: Option<Loading>,
+    /// The dialog for a file that is open.
+    dialog: Option<OpenDialog>,
     /// The error shown in a dialog.
     error: Option<ErrorDialog>,
     style: Style,
+    /// True if pinned and attached particles are marked.
+    shows_supports: bool,
     tool: Tool,
     clock: FrameClock,
     running: bool,
@@ -86,6 +93,8 @@ impl Viewer {
         };
         let (canvas, note) = Canvas::new(state, gpu.as_ref());
         notes.extend(note);
+        // A page cannot wait for results of the device: there it only draws.
+        let gpu = gpu.filter(|_| cfg!(not(target_family = "wasm")));
         let mut viewer = Self {
             canvas,
             gpu,
@@ -94,8 +103,10 @@ impl Viewer {
             notes,
             session: None,
             loading: None,
+            dialog: None,
             error: None,
             style: Style::default(),
+            shows_supports: true,
             tool: Tool::default(),
             clock: FrameClock::default(),
             running: !paused,
@@ -122,6 +133,19 @@ impl Viewer {
         }
     }
 
+    /// Loads a file of the user of a page.
+    #[cfg(target_family = "wasm")]
+    fn read_file(
+        &mut self,
+        context: &Context,
+        path: std::path::PathBuf,
+        bytes: impl Future<Output = Result<Vec<u8>, String>> + 'static,
+    ) {
+        let wake = context.clone();
+        let wake = move || wake.request_repaint();
+        self.loading = Some(Loading::read(path, bytes, self.tets, wake));
+    }
+
     /// Shows an error and pauses.
     fn fail(&mut self, error: &anyhow::Error) {
         self.error = Some(ErrorDialog::new("Simulation paused by an error", error));
@@ -144,8 +168,25 @@ impl Viewer {
 
     fn take_files(&mut self, context: &Context) {
         let dropped = context.input(|input| input.raw.dropped_files.first().cloned());
-        if let Some(file) = dropped {
-            self.load_file(context, file.path());
+        let chosen = self.dialog.as_ref().and_then(OpenDialog::poll);
+        #[cfg(not(target_family = "wasm"))]
+        {
+            let chosen = chosen.as_ref().map(|file| file.path());
+            if let Some(path) = dropped.as_ref().map(|file| file.path()).or(chosen) {
+                self.load_file(context, path);
+            }
+        }
+        #[cfg(target_family = "wasm")]
+        {
+            if let Some(file) = dropped {
+                let path = file.path().to_owned();
+                let bytes = async move { file.bytes_async().await };
+                self.read_file(context, path, bytes);
+            }
+            if let Some(file) = chosen {
+                let path = file.file_name().into();
+                self.read_file(context, path, async move { Ok(file.read().await) });
+            }
         }
         let Some(result) = self.loading.as_ref().and_then(Loading::poll) else {
             return;
@@ -157,6 +198,8 @@ impl Viewer {
                     "{} - incise",
                     session.name
                 )));
+                // A scene that cuts by itself would be over before it is seen.
+                self.running &= !session.waits_for_start();
                 self.session = Some(session);
                 (self.tool_in_use, self.line) = (false, Vec::new());
                 self.clock.pause();
@@ -232,13 +275,17 @@ impl Viewer {
         let by = |button| response.dragged_by(button);
         let delta = response.drag_delta();
         let part = |points: f32| f64::from(points) / size[1];
+        // With one button, as on a trackpad, keys replace the others.
+        let modifiers = context.input(|input| input.modifiers);
+        let primary = by(PointerButton::Primary) && !self.tool_in_use;
+        let pans = primary && modifiers.command;
         let orbits = by(PointerButton::Secondary)
-            || (self.tool == Tool::Orbit && by(PointerButton::Primary));
+            || (primary && !pans && (self.tool == Tool::Orbit || modifiers.shift));
         if orbits {
             session
                 .camera
                 .orbit(-4.0 * part(delta.x), 4.0 * part(delta.y));
-        } else if by(PointerButton::Middle) {
+        } else if pans || by(PointerButton::Middle) {
             session.camera.pan(part(delta.x), -part(delta.y));
         }
         if response.hovered() {
@@ -254,7 +301,7 @@ impl Viewer {
         }
         let primary = PointerButton::Primary;
         let mut result = Ok(());
-        if response.drag_started_by(primary) {
+        if response.drag_started_by(primary) && !orbits && !pans {
             let origin = context.input(|input| input.pointer.press_origin());
             let at = origin
                 .or(response.interact_pointer_pos())
@@ -318,8 +365,37 @@ impl Viewer {
         let drawn = measured
             .and_then(|()| session.color(self.style.color_by))
             .and_then(|()| self.canvas.show(ui, rect, session, &self.style));
-        overlay(ui, rect, session, &self.line);
+        if self.shows_supports {
+            supports(ui, rect, session);
+        }
+        overlay(ui, rect, session, &self.line, !self.running);
         self.check(drawn);
+    }
+
+    /// The text of the status line: the result of the last input, else the state and what the tool does.
+    fn status(&self) -> String {
+        let Some(session) = &self.session else {
+            return "No body: drop a scene, a mesh or a closed surface onto the window".to_owned();
+        };
+        if let Some(message) = session.message {
+            return message.to_owned();
+        }
+        let state = if self.running {
+            "Running"
+        } else if session.waits_for_start() {
+            "Paused: press Space to start the scene"
+        } else {
+            "Paused: press Space to resume"
+        };
+        let tool = match self.tool {
+            Tool::Blade if session.cuts() && !self.running => {
+                "The line is cut when the simulation resumes"
+            }
+            Tool::Blade => "Drag across the body to cut",
+            Tool::Grab => "Drag the body to pull it",
+            Tool::Orbit => "Drag to orbit",
+        };
+        format!("{state}. {tool}; Shift and drag to orbit, Ctrl and drag to pan, scroll to zoom.")
     }
 
     fn windows(&mut self, context: &Context) {
@@ -367,6 +443,10 @@ impl Viewer {
         if let Some(path) = commands.file {
             self.load_file(context, &path);
         }
+        if commands.asks_for_file {
+            let wake = context.clone();
+            self.dialog = Some(OpenDialog::open(move || wake.request_repaint()));
+        }
         for action in commands.actions {
             self.act(action);
         }
@@ -402,6 +482,7 @@ impl eframe::App for Viewer {
                 clock: &mut self.clock,
                 has_gpu: self.gpu.is_some(),
                 file: &mut self.file,
+                shows_supports: &mut self.shows_supports,
                 notes: &self.notes,
             };
             let session = self.session.as_mut();
@@ -410,10 +491,16 @@ impl eframe::App for Viewer {
             });
         }
         self.apply(&context, commands);
+        Panel::bottom("status").show(ui, |ui| ui.label(self.status()));
         CentralPanel::default()
             .frame(Frame::NONE)
             .show(ui, |ui| self.picture(ui));
         self.windows(&context);
+        #[cfg(target_family = "wasm")]
+        crate::web::publish(
+            self.session.as_ref().map(Session::report),
+            self.error.as_ref().map(|error| error.text.as_str()),
+        );
         let busy = self.loading.is_some() || (self.running && self.session.is_some());
         if busy {
             context.request_repaint();
@@ -445,19 +532,67 @@ fn pointer_positions(context: &Context) -> Vec<Pos2> {
     })
 }
 
-/// Draws the line of the blade and the target of the grab.
-fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2]) {
-    let painter = ui.painter_at(rect);
+/// Projection of points to the window.
+fn projected(rect: Rect, session: &Session) -> impl Fn(DVec3) -> Option<Pos2> + '_ {
+    let size = [f64::from(rect.width()), f64::from(rect.height())];
+    move |point| {
+        let at = session.camera.project(point, size)?;
+        #[expect(clippy::cast_possible_truncation, reason = "pixels of a window")]
+        let at = rect.min + egui::vec2(at.x as f32, at.y as f32);
+        Some(at)
+    }
+}
+
+/// Marks pinned and attached particles on the side of the body that faces the camera.
+fn supports(ui: &Ui, rect: Rect, session: &Session) {
+    let simulation = &session.simulation;
+    let supports = simulation.supports();
+    if supports.iter().all(|support| *support == Support::Free) {
+        return;
+    }
+    let (positions, eye) = (simulation.positions(), session.camera.eye());
+    let mut faces_eye = vec![false; positions.len()];
+    for triangle in simulation.boundary() {
+        let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
+        if (b - a).cross(c - a).dot(eye - a) > 0.0 {
+            for p in triangle.particles {
+                faces_eye[p.index()] = true;
+            }
+        }
+    }
+    let (painter, project) = (ui.painter_at(rect), projected(rect, session));
+    for ((&x, support), _) in positions
+        .iter()
+        .zip(supports)
+        .zip(faces_eye)
+        .filter(|mark| mark.1)
+    {
+        let color = match support {
+            Support::Pinned => Color32::from_rgb(40, 40, 40),
+            Support::Attached => Color32::from_rgb(30, 90, 190),
+            _ => continue,
+        };
+        if let Some(at) = project(x) {
+            painter.circle_filled(at, 2.0, color);
+        }
+    }
+}
+
+/// Draws the line of the blade, lines that wait to be cut, and the target of the grab.
+fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2], paused: bool) {
+    let (painter, project) = (ui.painter_at(rect), projected(rect, session));
+    if paused {
+        let dashed = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
+        for waiting in session.waiting_lines() {
+            let points: Vec<Pos2> = waiting.into_iter().filter_map(&project).collect();
+            painter.extend(Shape::dashed_line(&points, dashed, 8.0, 5.0));
+        }
+    }
     if session.cuts() && line.len() > 1 {
         let thin = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
         painter.line(line.to_vec(), thin);
     }
-    if let Some(to) = session.grab_target() {
-        let size = [f64::from(rect.width()), f64::from(rect.height())];
-        if let Some(at) = session.camera.project(to, size) {
-            #[expect(clippy::cast_possible_truncation, reason = "pixels of a window")]
-            let at = rect.min + egui::vec2(at.x as f32, at.y as f32);
-            painter.circle_stroke(at, 7.0, Stroke::new(2.0, Color32::from_rgb(30, 90, 190)));
-        }
+    if let Some(at) = session.grab_target().and_then(project) {
+        painter.circle_stroke(at, 7.0, Stroke::new(2.0, Color32::from_rgb(30, 90, 190)));
     }
 }

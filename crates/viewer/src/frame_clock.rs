@@ -3,7 +3,9 @@
 //! Simulated time keeps up with real time. If the simulation is too slow, time beyond [`PATIENCE`] is dropped, so that
 //! the window stays responsive; the panel shows the speed that is reached.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
+
+use web_time::Instant;
 
 /// Longest simulation time between two pictures.
 const PATIENCE: Duration = Duration::from_millis(40);

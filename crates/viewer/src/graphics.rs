@@ -43,22 +43,3 @@ pub(crate) fn share(state: &RenderState) -> Result<Arc<GpuContext>, String> {
         info.name, info.backend
     ))
 }
-
-/// The message shown if no window can be opened.
-pub(crate) fn why_no_window(error: &eframe::Error) -> String {
-    match error {
-        eframe::Error::WinitEventLoop(error) => {
-            // The text before the last colon is a location in winit.
-            let error = error.to_string();
-            let why = error.rsplit(": ").next().unwrap_or(&error);
-            format!(
-                "cannot open a window; a display is needed ({why}). Without one, `incise run` writes pictures"
-            )
-        }
-        eframe::Error::Wgpu(error) => format!(
-            "cannot open a window; no graphics adapter was found (Vulkan, Metal, Direct3D 12, OpenGL): {error}. Without one, \
-             `incise run` writes pictures"
-        ),
-        other => format!("cannot open a window: {other}"),
-    }
-}

@@ -46,9 +46,14 @@ const KEYS: [(Chord, &str, Action, &str); 20] = [
         (Modifiers::COMMAND, Key::Z),
         "Ctrl+Z",
         Action::Undo,
-        "Undo the last cut",
+        "Undo the last cut or reset",
     ),
-    ((PLAIN, Key::U), "U", Action::Undo, "Undo the last cut"),
+    (
+        (PLAIN, Key::U),
+        "U",
+        Action::Undo,
+        "Undo the last cut or reset",
+    ),
     (
         (PLAIN, Key::B),
         "B",
@@ -131,11 +136,13 @@ const KEYS: [(Chord, &str, Action, &str); 20] = [
     ((PLAIN, Key::Escape), "Esc", Action::Cancel, "Cancel, close"),
 ];
 
-const MOUSE: [(&str, &str); 5] = [
+const MOUSE: [(&str, &str); 7] = [
     ("Left button", "Use the tool: cut, grab or orbit"),
     ("Right button", "Orbit"),
     ("Middle button", "Pan"),
     ("Wheel", "Zoom"),
+    ("Shift and left button", "Orbit"),
+    ("Ctrl and left button", "Pan"),
     ("Drop a file", "Open a scene, mesh or surface"),
 ];
 

@@ -47,8 +47,4 @@ impl History {
     pub(crate) fn len(&self) -> usize {
         self.points.len()
     }
-
-    pub(crate) fn clear(&mut self) {
-        self.points.clear();
-    }
 }

@@ -6,7 +6,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
-use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use incise::gpu::GpuContext;
@@ -15,6 +14,7 @@ use incise::meshing::Solid;
 use incise::scene::{Backend, GroundSpec, location};
 use incise::{Body, Scene, Simulation, SimulationBuilder};
 use incise::{mesh_io, meshing};
+use web_time::Instant;
 
 /// Default number of tets to fill a surface with.
 pub(crate) const TETS: u32 = 11_000;
@@ -30,8 +30,18 @@ const STIFFNESS: f64 = 4e4;
 pub(crate) enum Source {
     /// A scene, its file and its name.
     Scene(Box<Scene>, Option<PathBuf>, String),
-    /// A mesh or a surface without a scene, and tets to fill a surface with.
-    Mesh(PathBuf, u32),
+    /// A mesh or a surface without a scene.
+    Mesh(MeshSource),
+}
+
+/// A mesh or a surface to load.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshSource {
+    path: PathBuf,
+    /// The contents of the file, if they are in memory.
+    bytes: Option<Vec<u8>>,
+    /// Tets to fill a surface with.
+    tets: u32,
 }
 
 impl Source {
@@ -43,10 +53,7 @@ impl Source {
             let name = "built-in liver".to_owned();
             return Ok(Self::Scene(Box::new(Scene::built_in()), None, name));
         };
-        if path
-            .extension()
-            .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
-        {
+        if is_scene(path) {
             let scene = Scene::load(path).with_context(|| path.display().to_string())?;
             let file = Some(path.to_owned());
             return Ok(Self::Scene(Box::new(scene), file, name_of(path)));
@@ -54,14 +61,33 @@ impl Source {
         if !path.is_file() {
             return Err(anyhow!("{}: file not found", path.display()));
         }
-        Ok(Self::Mesh(path.to_owned(), tets))
+        Ok(Self::Mesh(MeshSource {
+            path: path.to_owned(),
+            bytes: None,
+            tets,
+        }))
+    }
+
+    /// The source in the contents of a file, which need not exist.
+    #[cfg(any(test, target_family = "wasm"))]
+    pub(crate) fn from_bytes(path: &Path, bytes: Vec<u8>, tets: u32) -> anyhow::Result<Self> {
+        if !is_scene(path) {
+            return Ok(Self::Mesh(MeshSource {
+                path: path.to_owned(),
+                bytes: Some(bytes),
+                tets,
+            }));
+        }
+        let text = String::from_utf8(bytes).with_context(|| path.display().to_string())?;
+        let scene = Scene::from_toml(&text).with_context(|| path.display().to_string())?;
+        Ok(Self::Scene(Box::new(scene), None, name_of(path)))
     }
 
     /// The name for the title.
     pub(crate) fn name(&self) -> String {
         match self {
             Self::Scene(_, _, name) => name.clone(),
-            Self::Mesh(path, _) => name_of(path),
+            Self::Mesh(mesh) => name_of(&mesh.path),
         }
     }
 
@@ -86,9 +112,14 @@ impl Source {
                 scene.solver.backend = Backend::Cpu;
                 Ok((scene.clone(), SimulationBuilder::from_scene(scene)))
             }
-            Self::Mesh(path, tets) => scene_around(path, *tets),
+            Self::Mesh(mesh) => scene_around(mesh),
         }
     }
+}
+
+fn is_scene(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ending.eq_ignore_ascii_case("toml"))
 }
 
 fn name_of(path: &Path) -> String {
@@ -97,14 +128,21 @@ fn name_of(path: &Path) -> String {
 }
 
 /// A scene with a mesh on a table; a surface is filled with tets.
-fn scene_around(path: &Path, tets: u32) -> anyhow::Result<(Scene, SimulationBuilder)> {
+fn scene_around(source: &MeshSource) -> anyhow::Result<(Scene, SimulationBuilder)> {
+    let MeshSource { path, bytes, tets } = source;
     let mesh = if mesh_io::is_surface(path) {
-        let surface = mesh_io::read_surface(path)?;
+        let surface = match bytes {
+            Some(bytes) => mesh_io::parse_surface(path, bytes)?,
+            None => mesh_io::read_surface(path)?,
+        };
         let solid = Solid::new(&surface).with_context(|| path.display().to_string())?;
-        meshing::tetrahedralize(&solid, tets as usize, 0)
+        meshing::tetrahedralize(&solid, *tets as usize, 0)
             .with_context(|| path.display().to_string())?
     } else {
-        mesh_io::read(path)?
+        match bytes {
+            Some(bytes) => mesh_io::parse_file(path, bytes)?.mesh,
+            None => mesh_io::read(path)?,
+        }
     };
     let start = [DVec3::INFINITY, DVec3::NEG_INFINITY];
     let [low, high] = mesh
@@ -149,7 +187,7 @@ pub(crate) struct Loading {
 }
 
 impl Loading {
-    /// Starts to load; `wake` is called when it is done. `gpu` is the window's device, if it can simulate.
+    /// Starts to load, or loads where there are no threads; `wake` is called when it is done. `gpu` is the window's device, if it can simulate.
     pub(crate) fn start(
         source: Source,
         backend: Backend,
@@ -158,14 +196,47 @@ impl Loading {
     ) -> Self {
         let (sender, receiver) = channel();
         let name = source.name();
-        std::thread::spawn(move || {
+        let since = Instant::now();
+        let work = move || {
             // The receiver may be gone.
             let _ = sender.send(load(&source, backend, gpu));
+            wake();
+        };
+        if cfg!(target_family = "wasm") {
+            work();
+        } else {
+            std::thread::spawn(work);
+        }
+        Self {
+            name,
+            since,
+            receiver,
+        }
+    }
+
+    /// Loads a file of the user of a page once its contents have been read; `wake` is called when it is done.
+    #[cfg(target_family = "wasm")]
+    pub(crate) fn read(
+        path: PathBuf,
+        bytes: impl Future<Output = Result<Vec<u8>, String>> + 'static,
+        tets: u32,
+        wake: impl FnOnce() + 'static,
+    ) -> Self {
+        let (sender, receiver) = channel();
+        let (name, since) = (name_of(&path), Instant::now());
+        wasm_bindgen_futures::spawn_local(async move {
+            let loaded = bytes
+                .await
+                .map_err(|why| anyhow!("{}: {why}", path.display()))
+                .and_then(|bytes| Source::from_bytes(&path, bytes, tets))
+                .and_then(|source| load(&source, Backend::Cpu, None));
+            // The receiver may be gone.
+            let _ = sender.send(loaded);
             wake();
         });
         Self {
             name,
-            since: Instant::now(),
+            since,
             receiver,
         }
     }
@@ -218,6 +289,31 @@ mod tests {
         assert!((high - low - DVec3::new(4.0, 2.0, 6.0) * SIZE / 6.0).length() < 1e-7);
         assert!(low.z.abs() < 1e-7 && (low.x + high.x).abs() < 1e-7);
         assert_eq!(loaded.name, "body.vtk");
+    }
+
+    #[test]
+    fn files_in_memory_are_read_as_those_on_disk() {
+        let folder = tempfile::tempdir().unwrap();
+        let mesh = kuhn_box([2; 3], DVec3::ONE);
+        let surface = TriangleSurface::boundary_of(&mesh);
+        let (a, b, c) = (
+            folder.path().join("a.vtk"),
+            folder.path().join("b.stl"),
+            folder.path().join("c.toml"),
+        );
+        mesh_io::write(&a, &mesh).unwrap();
+        mesh_io::write_surface(&b, &surface).unwrap();
+        std::fs::write(&c, "[[body]]\nshape = { kind = \"box\", tets = 10 }\n").unwrap();
+        for path in [a, b, c] {
+            let bytes = std::fs::read(&path).unwrap();
+            let on_disk = Source::new(Some(&path), 500).unwrap();
+            let in_memory = Source::from_bytes(&path, bytes, 500).unwrap();
+            let [left, right] = [on_disk, in_memory].map(|source| {
+                let loaded = load(&source, Backend::Cpu, None).unwrap();
+                (loaded.name, loaded.simulation.positions().to_vec())
+            });
+            assert_eq!(left, right);
+        }
     }
 
     #[test]

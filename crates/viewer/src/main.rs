@@ -1,4 +1,4 @@
-//! `incise-viewer`: a window for cutting soft bodies.
+//! `incise-viewer`: a window or a web page for cutting soft bodies.
 //!
 //! A scene is loaded in the background and simulated in real time. The mouse cuts, grabs and pulls; the panel shows stage
 //! times and solver settings with the measured effect of each change. This crate is input and display only: `incise`
@@ -11,111 +11,24 @@ mod graphics;
 mod help;
 mod history;
 mod load;
+#[cfg(not(target_family = "wasm"))]
+mod native;
+mod open_dialog;
 mod panel;
 mod session;
 mod setting_effects;
 mod settings;
 mod times;
 mod tool;
+#[cfg(target_family = "wasm")]
+mod web;
 
-use std::path::PathBuf;
-use std::process::ExitCode;
-
-use anyhow::anyhow;
-use clap::{Parser, ValueEnum};
-use eframe::egui;
-
-use crate::app::Viewer;
-use crate::load::Source;
-
-/// A window to cut soft bodies in.
-///
-/// Mouse: left button cuts or grabs, right orbits, middle pans, wheel zooms. F1 shows all keys. Drop a scene, a mesh or a
-/// closed surface onto the window to open it.
-///
-/// Example: incise-viewer fixtures/crossing.toml
-#[derive(Debug, Parser)]
-#[command(version, verbatim_doc_comment)]
-struct Arguments {
-    /// A scene (.toml), a tet mesh or a closed triangle surface; absent: the built-in liver.
-    file: Option<PathBuf>,
-    /// Backend of the simulation; `auto` takes a hardware GPU if there is one.
-    #[arg(long, value_enum, default_value_t = BackendName::Auto)]
-    backend: BackendName,
-    /// Start paused; the space bar starts the simulation.
-    #[arg(long)]
-    paused: bool,
-    /// Approximate number of tets that fill a closed surface.
-    #[arg(long, default_value_t = load::TETS, value_parser = clap::value_parser!(u32).range(100..=2_000_000))]
-    tets: u32,
+#[cfg(not(target_family = "wasm"))]
+fn main() -> std::process::ExitCode {
+    native::main()
 }
 
-/// Backend of the simulation.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum BackendName {
-    /// The CPU.
-    Cpu,
-    /// The GPU of the window, of any kind.
-    Gpu,
-    /// The GPU of the window if it is a hardware one that supports the kernels, else the CPU.
-    Auto,
-}
-
-impl From<BackendName> for incise::scene::Backend {
-    fn from(name: BackendName) -> Self {
-        match name {
-            BackendName::Cpu => Self::Cpu,
-            BackendName::Gpu => Self::Gpu,
-            BackendName::Auto => Self::Auto,
-        }
-    }
-}
-
-fn main() -> ExitCode {
-    let arguments = Arguments::parse();
-    let source = match Source::new(arguments.file.as_deref(), arguments.tets) {
-        Ok(source) => source,
-        Err(error) => {
-            complain(&error);
-            return ExitCode::from(2);
-        }
-    };
-    match open(source, &arguments) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(error) => {
-            complain(&error);
-            ExitCode::FAILURE
-        }
-    }
-}
-
-#[expect(clippy::print_stderr, reason = "a program without a window yet")]
-fn complain(error: &anyhow::Error) {
-    eprintln!("incise-viewer: {error:#}");
-}
-
-/// Opens the window and stays until it is closed.
-fn open(source: Source, arguments: &Arguments) -> anyhow::Result<()> {
-    let options = eframe::NativeOptions {
-        viewport: egui::ViewportBuilder::default()
-            .with_title("incise")
-            .with_app_id("incise-viewer")
-            .with_inner_size([1280.0, 800.0])
-            .with_min_inner_size([480.0, 320.0])
-            .with_drag_and_drop(true),
-        renderer: eframe::Renderer::Wgpu,
-        wgpu_options: graphics::configuration(),
-        ..eframe::NativeOptions::default()
-    };
-    let (backend, tets, paused) = (arguments.backend.into(), arguments.tets, arguments.paused);
-    eframe::run_native(
-        "incise",
-        options,
-        Box::new(move |creation| {
-            Ok(Box::new(Viewer::new(
-                creation, source, backend, tets, paused,
-            )))
-        }),
-    )
-    .map_err(|error| anyhow!("{}", graphics::why_no_window(&error)))
+#[cfg(target_family = "wasm")]
+fn main() {
+    web::main();
 }

@@ -24,6 +24,8 @@ pub(crate) struct Controls<'a> {
     pub(crate) has_gpu: bool,
     /// The text of the field for a file.
     pub(crate) file: &'a mut String,
+    /// True if pinned and attached particles are marked.
+    pub(crate) shows_supports: &'a mut bool,
     /// Notes about the backend and the renderer.
     pub(crate) notes: &'a [String],
 }
@@ -35,6 +37,8 @@ pub(crate) struct UiCommands {
     pub(crate) change: Option<SettingChange>,
     /// A file to open.
     pub(crate) file: Option<PathBuf>,
+    /// True if a dialog shall ask for a file.
+    pub(crate) asks_for_file: bool,
     /// New state of the checkbox for residuals, if it was changed.
     pub(crate) measure: Option<bool>,
 }
@@ -48,6 +52,8 @@ pub(crate) fn show(
     let mut commands = UiCommands::default();
     ScrollArea::vertical().show(ui, |ui| {
         ui.add_space(4.0);
+        files(ui, controls, &mut commands);
+        ui.separator();
         let mut note = None;
         if let Some(session) = session {
             ui.heading(&session.name);
@@ -67,9 +73,8 @@ pub(crate) fn show(
             ui.separator();
             note = session.simulation.backend_note();
         }
-        files(ui, controls, &mut commands);
         for note in controls.notes.iter().map(String::as_str).chain(note) {
-            ui.label(RichText::new(note).weak().small());
+            ui.label(note);
         }
     });
     commands
@@ -82,7 +87,7 @@ fn buttons(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>, commands
             (pause, Action::Pause, true),
             ("Step", Action::Step, !controls.running),
             ("Reset", Action::Reset, true),
-            ("Undo cut", Action::Undo, session.strokes() > 0),
+            ("Undo", Action::Undo, session.undo_points() > 0),
             ("Fit", Action::Fit, true),
             ("Help", Action::Help, true),
         ] {
@@ -95,7 +100,8 @@ fn buttons(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>, commands
         Slider::new(&mut controls.clock.speed, 0.05..=2.0)
             .logarithmic(true)
             .text("Speed (x real time)"),
-    );
+    )
+    .on_hover_text("Simulated seconds per second, if the frame time allows it");
 }
 
 fn tools(
@@ -126,19 +132,25 @@ fn tools(
                         depth if depth >= 1.0 => "Through".to_owned(),
                         depth => format!("{:.0}%", 100.0 * depth),
                     }),
-            );
-            ui.add(Slider::new(&mut tool_settings.snap, 0.0..=0.25).text("Snap (part of an edge)"));
+            )
+            .on_hover_text("Depth of the blade below the surface, in % of the body's size");
+            ui.add(Slider::new(&mut tool_settings.snap, 0.0..=0.25).text("Snap (part of an edge)"))
+                .on_hover_text(
+                    "The cut moves to particles that are closer than this: better tets, a rougher cut",
+                );
         }
         Tool::Grab => {
             ui.add(
                 Slider::new(&mut tool_settings.radius, 0.01..=0.3)
                     .text("Radius (part of the size)"),
-            );
+            )
+            .on_hover_text("Particles within this distance of the pointer are pulled");
             ui.add(
                 Slider::new(&mut tool_settings.compliance, 1e-5..=1.0)
                     .logarithmic(true)
                     .text("Compliance (m/N)"),
-            );
+            )
+            .on_hover_text("Softness of the grab of each particle: metres per newton");
         }
         Tool::Orbit => {}
     }
@@ -157,6 +169,10 @@ fn look(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>) {
         ui.checkbox(&mut style.wireframe, "Wireframe");
         ui.checkbox(&mut style.smooth, "Smooth");
     });
+    ui.checkbox(
+        controls.shows_supports,
+        "Mark pinned and attached particles",
+    );
     if let Some(legend) = &session.legend {
         bar(ui, legend);
     } else if style.color_by == ColorBy::Residual {
@@ -265,11 +281,18 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
     }
 }
 
-/// A field for a file name, since not every desktop supports dropping files onto a window.
+/// A button for the dialog, and a field for a file name where there is none, as in a window of another machine.
 fn files(ui: &mut Ui, controls: &mut Controls<'_>, commands: &mut UiCommands) {
     ui.horizontal(|ui| {
         let field = TextEdit::singleline(controls.file).hint_text("Scene, mesh or surface file");
-        let typed = ui.add(field.desired_width(230.0));
+        if ui.button("Open...").clicked() {
+            commands.asks_for_file = true;
+        }
+        if cfg!(target_family = "wasm") {
+            ui.label("or drop a file onto the page");
+            return;
+        }
+        let typed = ui.add(field.desired_width(180.0));
         let enter = typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
         let on = !controls.file.trim().is_empty();
         if ui.add_enabled(on, Button::new("Open")).clicked() || (enter && on) {

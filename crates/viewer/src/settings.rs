@@ -117,7 +117,10 @@ pub(crate) fn show(
             .logarithmic(true)
             .clamping(SliderClamping::Edits);
         let moved = ui.add_enabled(!auto, slider.text("Substeps")).changed();
-        if ui.checkbox(&mut auto, "Auto").changed() || moved {
+        let automatic = ui.checkbox(&mut auto, "Auto");
+        let automatic =
+            automatic.on_hover_text("Substeps a frame, chosen by stiffness and frame time");
+        if automatic.changed() || moved {
             let substeps = if auto {
                 Substeps::Auto
             } else {
@@ -133,7 +136,9 @@ pub(crate) fn show(
     let slider = Slider::new(&mut iterations, 1..=200)
         .logarithmic(true)
         .clamping(SliderClamping::Edits);
-    if ui.add(slider.text("Iterations")).changed() {
+    let added = ui.add(slider.text("Iterations"));
+    let added = added.on_hover_text("Passes over all constraints in a substep");
+    if added.changed() {
         let spec_after = spec.clone().with(|spec| spec.iterations = iterations);
         let (from, to) = (spec.iterations.to_string(), iterations.to_string());
         changed("Iterations", from, to, spec_after);
@@ -143,7 +148,9 @@ pub(crate) fn show(
     let slider = Slider::new(&mut relaxation, 0.05..=1.9)
         .max_decimals(2)
         .clamping(SliderClamping::Edits);
-    if ui.add(slider.text("Relaxation")).changed() {
+    let added = ui.add(slider.text("Relaxation"));
+    let added = added.on_hover_text("Part of each correction that is applied");
+    if added.changed() {
         let spec_after = spec.clone().with(|spec| spec.relaxation = relaxation);
         let (from, to) = (
             format!("{:.2}", spec.relaxation),
@@ -173,7 +180,8 @@ pub(crate) fn show(
                 clustering = clustering_name(kind, size);
             }
         }
-        ui.label("Clustering");
+        ui.label("Clustering")
+            .on_hover_text("Tets that one thread solves in order, and the largest number of them");
         if clustering != spec.clustering {
             let spec_after = spec
                 .clone()

@@ -5,11 +5,10 @@
 //! particles that cuts add depend on the position of the body. Cost: a copy of the positions and a pass over the tets
 //! after each frame, not counted as time of the frame.
 
-use std::time::Instant;
-
 use glam::DVec3;
 use incise_mesh::{TetId, TetMesh, signed_volume};
 use serde::{Deserialize, Serialize};
+use web_time::Instant;
 
 use crate::report::milliseconds;
 use crate::{Error, Scene, Simulation};

@@ -4,9 +4,8 @@
 //! and only data of all particles is read back. Cost: a pass for the reported quantities; a wait for the device if they
 //! need it.
 
-use std::time::Instant;
-
 use incise_mesh::ParticleId;
+use web_time::Instant;
 
 use super::Simulation;
 use crate::Error;

@@ -4,10 +4,10 @@
 //! left out and rebuilt: the layout of the solvers, and buffers on a device. Cost of a copy: O(particles + tets).
 
 use std::sync::Arc;
-use std::time::Instant;
 
 use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
+use web_time::Instant;
 
 use crate::attachment::AttachmentHandle;
 use crate::blade_sides::touching;

@@ -95,16 +95,13 @@ pub(super) fn create(
     if bytes > limit {
         return Err(GpuError::TooLarge { what, bytes, limit });
     }
-    let device = gpu.device();
-    let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-    let buffer = device.create_buffer(&wgpu::BufferDescriptor {
-        label: Some(what),
-        size: bytes.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
-        usage,
-        mapped_at_creation: false,
+    let created = gpu.guarded(wgpu::ErrorFilter::OutOfMemory, |device| {
+        device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some(what),
+            size: bytes.next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT),
+            usage,
+            mapped_at_creation: false,
+        })
     });
-    match pollster::block_on(memory.pop()) {
-        Some(_) => Err(GpuError::OutOfMemory { what, bytes }),
-        None => Ok(buffer),
-    }
+    created.map_err(|_| GpuError::OutOfMemory { what, bytes })
 }

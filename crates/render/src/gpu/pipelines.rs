@@ -46,8 +46,14 @@ impl Pipelines {
     /// # Errors
     /// If the device rejects one of them.
     pub(super) fn new(gpu: &GpuContext) -> Result<Self, RenderError> {
-        // Validation errors are returned here instead of reaching the handler of uncaptured errors.
-        let refused = gpu.device().push_error_scope(wgpu::ErrorFilter::Validation);
+        let created = gpu.guarded(wgpu::ErrorFilter::Validation, |_| Self::create(gpu));
+        created.map_err(|error| RenderError::Unable {
+            adapter: gpu.adapter().name.clone(),
+            reason: one_line(&error.to_string()),
+        })
+    }
+
+    fn create(gpu: &GpuContext) -> Self {
         let how = How {
             shader: "",
             fragment: "fragment",
@@ -71,7 +77,7 @@ impl Pipelines {
                 },
             )
         };
-        let pipelines = Self {
+        Self {
             normals: computed(gpu, "normals"),
             contact_shadow: drawn(
                 gpu,
@@ -118,13 +124,6 @@ impl Pipelines {
                     ..how
                 },
             ),
-        };
-        match pollster::block_on(refused.pop()) {
-            Some(error) => Err(RenderError::Unable {
-                adapter: gpu.adapter().name.clone(),
-                reason: one_line(&error.to_string()),
-            }),
-            None => Ok(pipelines),
         }
     }
 }

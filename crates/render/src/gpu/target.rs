@@ -32,30 +32,32 @@ pub(super) struct Target {
 
 impl Target {
     pub(super) fn new(gpu: &GpuContext, size: [u32; 2]) -> Result<Self, RenderError> {
-        let device = gpu.device();
-        let memory = device.push_error_scope(wgpu::ErrorFilter::OutOfMemory);
-        let texture = |label, format, sample_count, usage, view_formats| {
-            device.create_texture(&wgpu::TextureDescriptor {
-                label: Some(label),
-                size: extent(size),
-                mip_level_count: 1,
-                sample_count,
-                dimension: wgpu::TextureDimension::D2,
-                format,
-                usage,
-                view_formats,
-            })
-        };
-        let drawn = TextureUsages::RENDER_ATTACHMENT;
-        let samples = texture("samples", COLOR, SAMPLES, drawn, &[]);
-        let depth = texture("depth", DEPTH, SAMPLES, drawn, &[]);
-        let shown = drawn | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
-        let resolved = texture("picture", COLOR, 1, shown, &[STORED]);
-        if pollster::block_on(memory.pop()).is_some() {
+        let created = gpu.guarded(wgpu::ErrorFilter::OutOfMemory, |device| {
+            let texture = |label, format, sample_count, usage, view_formats| {
+                device.create_texture(&wgpu::TextureDescriptor {
+                    label: Some(label),
+                    size: extent(size),
+                    mip_level_count: 1,
+                    sample_count,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage,
+                    view_formats,
+                })
+            };
+            let drawn = TextureUsages::RENDER_ATTACHMENT;
+            let shown = drawn | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
+            [
+                texture("samples", COLOR, SAMPLES, drawn, &[]),
+                texture("depth", DEPTH, SAMPLES, drawn, &[]),
+                texture("picture", COLOR, 1, shown, &[STORED]),
+            ]
+        });
+        let [samples, depth, resolved] = created.map_err(|_| {
             let bytes = u64::from(size[0]) * u64::from(size[1]) * u64::from(8 * SAMPLES + 4);
             let what = "a picture";
-            return Err(GpuError::OutOfMemory { what, bytes }.into());
-        }
+            GpuError::OutOfMemory { what, bytes }
+        })?;
         let view =
             |texture: &wgpu::Texture| texture.create_view(&wgpu::TextureViewDescriptor::default());
         Ok(Self {

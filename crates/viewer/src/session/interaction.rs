@@ -28,8 +28,8 @@ struct BladePose {
 pub(super) struct Line {
     /// Poses that have not been cut yet.
     waiting: VecDeque<BladePose>,
-    /// Pointer position of the last pose that was cut.
-    last_cut: Option<[f64; 2]>,
+    /// The last pose that was cut.
+    last_cut: Option<BladePose>,
     /// Distance in m from the eye to the body where the view ray last hit it.
     surface: Option<f64>,
     /// True if the button is up: the line ends with its last pose.
@@ -45,7 +45,7 @@ impl Line {
     fn push(&mut self, pose: BladePose) {
         let from = match self.waiting.len() {
             0 => None,
-            1 => self.last_cut,
+            1 => self.last_cut.map(|pose| pose.pixel),
             more => Some(self.waiting[more - 2].pixel),
         };
         if let (Some(from), Some(last)) = (from, self.waiting.back_mut())
@@ -59,7 +59,10 @@ impl Line {
 
     /// The last pointer position of the line.
     fn last(&self) -> Option<[f64; 2]> {
-        self.waiting.back().map(|pose| pose.pixel).or(self.last_cut)
+        self.waiting
+            .back()
+            .or(self.last_cut.as_ref())
+            .map(|pose| pose.pixel)
     }
 }
 
@@ -135,6 +138,16 @@ impl Session {
         !self.lines.is_empty()
     }
 
+    /// The drawn lines that are not cut yet, as points in the middle of the blade.
+    pub(crate) fn waiting_lines(&self) -> impl Iterator<Item = Vec<DVec3>> + '_ {
+        let middle = |pose: &BladePose| (pose.ends[0] + pose.ends[1]) / 2.0;
+        let lines = self.lines.iter();
+        lines.map(move |line| {
+            let cut = line.last_cut.iter();
+            cut.chain(&line.waiting).map(middle).collect()
+        })
+    }
+
     /// Drops all lines and ends the stroke of the one that is being cut.
     pub(super) fn drop_lines(&mut self) {
         for line in std::mem::take(&mut self.lines) {
@@ -152,7 +165,7 @@ impl Session {
             return Ok(());
         };
         if let Some(pose) = line.waiting.pop_front() {
-            line.last_cut = Some(pose.pixel);
+            line.last_cut = Some(pose);
             match line.stroke {
                 Some(stroke) => self.simulation.move_blade(stroke, &pose.ends)?,
                 None => {
@@ -197,13 +210,15 @@ impl Session {
         Ok(hit.map(|hit| hit.distance))
     }
 
-    /// Grabs the body under a pixel; returns true if particles were grabbed.
+    /// Grabs the body under a pixel; returns true if particles were grabbed, else [`Session::message`] is the reason.
     pub(crate) fn grab_at(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<bool> {
         self.release();
         self.simulation.read_back()?;
         let (origin, direction) = self.camera.ray(pixel, size);
         let positions = self.simulation.positions();
+        self.message = None;
         let Some(hit) = self.simulation.ray_cast(origin, direction) else {
+            self.message = Some("Nothing to grab here");
             return Ok(false);
         };
         // A radius smaller than a triangle grabs the nearest corner.
@@ -220,6 +235,9 @@ impl Session {
             depth: (hit.point - origin).dot(self.camera.forward()),
             to: hit.point,
         });
+        if self.active_grab.is_none() {
+            self.message = Some("Pinned or attached here: grab a free part");
+        }
         Ok(self.active_grab.is_some())
     }
 
@@ -255,7 +273,10 @@ mod tests {
     fn line(pixels: &[[f64; 2]]) -> Line {
         let mut line = Line {
             waiting: VecDeque::new(),
-            last_cut: Some([0.0, 0.0]),
+            last_cut: Some(BladePose {
+                pixel: [0.0, 0.0],
+                ends: [DVec3::ZERO; 2],
+            }),
             surface: None,
             is_finished: false,
             stroke: None,

@@ -6,7 +6,6 @@
 mod interaction;
 
 use std::collections::VecDeque;
-use std::time::Instant;
 
 use anyhow::Context;
 use incise::mesh::glam::DVec3;
@@ -14,6 +13,7 @@ use incise::report::FrameReport;
 use incise::scene::{Quantity, ReportSpec, SolverSpec};
 use incise::{Grab, Scene, Simulation, Snapshot};
 use incise_render::{Camera, ColorBy, Legend, RenderScene};
+use web_time::Instant;
 
 use self::interaction::Line;
 use crate::history::{History, UndoPoint};
@@ -62,6 +62,8 @@ pub(crate) struct Session {
     /// Drawn lines that are not cut to their end, oldest first.
     lines: VecDeque<Line>,
     active_grab: Option<ActiveGrab>,
+    /// Result of the last input, for the status line.
+    pub(crate) message: Option<&'static str>,
     /// The diagonal of all bodies when they were loaded, in m.
     extent: f64,
     /// First frames of the scene's own strokes.
@@ -101,6 +103,7 @@ impl Session {
             history: History::default(),
             lines: VecDeque::new(),
             active_grab: None,
+            message: None,
             extent: (high - low).length(),
         };
         session.measure(true)?;
@@ -177,6 +180,11 @@ impl Session {
         }
     }
 
+    /// True in a scene with strokes of its own that has not begun.
+    pub(crate) fn waits_for_start(&self) -> bool {
+        self.simulation.next_frame() == 0 && !self.scripted.is_empty()
+    }
+
     pub(crate) fn report(&self) -> &FrameReport {
         self.simulation.report()
     }
@@ -217,12 +225,13 @@ impl Session {
         })
     }
 
-    /// Number of strokes that can be undone.
-    pub(crate) fn strokes(&self) -> usize {
+    /// Number of strokes and resets that can be undone.
+    pub(crate) fn undo_points(&self) -> usize {
         self.history.len()
     }
 
-    /// Undoes the last stroke; returns true if it is part of the scene and begins again, and `None` without a stroke.
+    /// Undoes the last stroke or reset; returns true for a stroke that is part of the scene and begins again, and `None` if
+    /// there is nothing to undo.
     pub(crate) fn undo(&mut self) -> anyhow::Result<Option<bool>> {
         let Some(point) = self.history.pop() else {
             return Ok(None);
@@ -231,15 +240,18 @@ impl Session {
         Ok(Some(point.scripted))
     }
 
-    /// Resets to the first frame.
+    /// Resets to the first frame. The state before can be restored by [`Session::undo`].
     pub(crate) fn reset(&mut self) -> anyhow::Result<()> {
+        if self.simulation.next_frame() > 0 {
+            let before = self.undo_point(false)?;
+            self.history.push(before);
+        }
         let start = UndoPoint {
             snapshot: self.start.clone(),
             scripted: false,
             stroke: None,
             grab: None,
         };
-        self.history.clear();
         self.go_to(&start)
     }
 

@@ -58,7 +58,7 @@ fn a_drawn_line_cuts_and_is_undone() {
     session.step().unwrap();
     let tets = session.report().tets;
     cut(&mut session);
-    assert_eq!((session.report().pieces, session.strokes()), (2, 1));
+    assert_eq!((session.report().pieces, session.undo_points()), (2, 1));
     session.simulation.check().unwrap();
     assert_eq!(session.undo().unwrap(), Some(false));
     assert_eq!((session.report().pieces, session.report().tets), (1, tets));
@@ -66,8 +66,22 @@ fn a_drawn_line_cuts_and_is_undone() {
     // A cut that was undone can be repeated.
     cut(&mut session);
     assert_eq!(session.report().pieces, 2);
+    let frame = session.simulation.next_frame();
     session.reset().unwrap();
-    assert_eq!((session.simulation.next_frame(), session.strokes()), (0, 0));
+    assert_eq!(
+        (session.simulation.next_frame(), session.report().pieces),
+        (0, 1)
+    );
+    // A reset is undone; one of the first frame is nothing to undo.
+    session.reset().unwrap();
+    assert_eq!(session.undo_points(), 2);
+    assert_eq!(session.undo().unwrap(), Some(false));
+    assert_eq!(
+        (session.simulation.next_frame(), session.report().pieces),
+        (frame, 2)
+    );
+    assert_eq!(session.undo().unwrap(), Some(false));
+    assert_eq!(session.report().pieces, 1);
 }
 
 #[test]
@@ -80,11 +94,11 @@ fn lines_drawn_while_paused_are_cut_in_order() {
     }
     // A finished line is not continued.
     session.draw_blade([20.0, 580.0], SIZE).unwrap();
-    assert_eq!((session.report().pieces, session.strokes()), (1, 0));
+    assert_eq!((session.report().pieces, session.undo_points()), (1, 0));
     while session.cuts() {
         session.step().unwrap();
     }
-    assert_eq!((session.report().pieces, session.strokes()), (3, 2));
+    assert_eq!((session.report().pieces, session.undo_points()), (3, 2));
     session.undo().unwrap();
     assert_eq!(session.report().pieces, 2);
     session.undo().unwrap();
@@ -100,7 +114,7 @@ fn a_line_beside_the_body_adds_no_undo_point() {
     while session.cuts() {
         session.step().unwrap();
     }
-    assert_eq!((session.report().pieces, session.strokes()), (1, 0));
+    assert_eq!((session.report().pieces, session.undo_points()), (1, 0));
 }
 
 #[test]
@@ -121,6 +135,53 @@ fn undo_releases_the_grab_of_its_state() {
     assert_eq!(session.solver().method, Method::Vbd);
     // No grab is left: the body can be grabbed at the same point.
     assert!(session.grab_at([400.0, 300.0], SIZE).unwrap());
+}
+
+#[test]
+fn a_scene_that_cuts_waits_for_its_start() {
+    let mut scripted = session(PLANE);
+    assert!(scripted.waits_for_start() && !session("").waits_for_start());
+    scripted.step().unwrap();
+    assert!(!scripted.waits_for_start());
+}
+
+#[test]
+fn waiting_lines_are_shown_where_they_were_drawn() {
+    let mut session = session("");
+    let drawn = [[330.0, 20.0], [330.0, 300.0], [470.0, 300.0]];
+    session.press_blade(drawn[0], SIZE).unwrap();
+    for pixel in &drawn[1..] {
+        session.draw_blade(*pixel, SIZE).unwrap();
+    }
+    session.lift_blade();
+    let lines: Vec<Vec<DVec3>> = session.waiting_lines().collect();
+    assert_eq!((lines.len(), lines[0].len()), (1, 3));
+    for (point, pixel) in lines[0].iter().zip(drawn) {
+        let at = session.camera.project(*point, SIZE).unwrap();
+        assert!((at.x - pixel[0]).hypot(at.y - pixel[1]) < 1e-6);
+    }
+    while session.cuts() {
+        session.step().unwrap();
+    }
+    assert_eq!(session.waiting_lines().count(), 0);
+}
+
+#[test]
+fn what_is_pinned_cannot_be_grabbed_and_says_so() {
+    let fixed = "fixed = [{ half_space = { point = [0, 0, 0.2], normal = [0, 0, -1] } }]";
+    let mut session = session(fixed);
+    assert!(!session.grab_at([400.0, 300.0], SIZE).unwrap());
+    assert!(
+        session
+            .message
+            .is_some_and(|text| text.starts_with("Pinned"))
+    );
+    assert!(!session.grab_at([2.0, 2.0], SIZE).unwrap());
+    assert!(
+        session
+            .message
+            .is_some_and(|text| text.starts_with("Nothing"))
+    );
 }
 
 #[test]
