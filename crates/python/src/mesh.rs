@@ -90,7 +90,7 @@ impl Mesh {
         mesh.map(Self::new).map_err(|error| refused_file(&error))
     }
 
-    /// Writes a file; the format is that of its ending, as in ``load``, or a surface as ``.obj``, ``.stl`` or ``.ply``.
+    /// Writes a file; the format is that of its ending, as in ``load``. An existing file is replaced.
     #[pyo3(signature = (path, /))]
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
         let written = compute(py, || mesh_io::write(path, &self.mesh))?;
