@@ -15,7 +15,7 @@ use crate::attachment::detach_all;
 use crate::backend::{AnySolver, each, each_mut};
 
 /// Handle of an interactive grab in the simulation that returned it: see [`Simulation::grab`](crate::Simulation::grab).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Grab(pub(crate) u64);
 
 /// A grab and its handle in the solver.

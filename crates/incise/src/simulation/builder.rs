@@ -108,6 +108,32 @@ impl Body {
         self.spec.fixed.push(particles);
         self
     }
+
+    /// Returns the body after a change of its keys in a scene, for those without a method of their own: regions of pinned
+    /// particles in the world, substeps, compliance of the volume. The geometry stays that of the mesh: a body that names a
+    /// file or a shape as well is an error when the simulation is built.
+    ///
+    /// ```
+    /// use incise::meshing::{Shape, generate};
+    /// use incise::scene::{Quantity, Region, ReportSpec};
+    /// use incise::{Body, Simulation};
+    ///
+    /// let body = Body::new(generate(Shape::Beam, 300)?).with(|body| {
+    ///     body.fixed.push(Region::half_space([-0.45, 0.0, 0.0], [-1.0, 0.0, 0.0]));
+    ///     body.substeps = Some(7.into());
+    /// });
+    /// let mut builder = Simulation::builder();
+    /// builder.add_body(body);
+    /// builder.report(ReportSpec::default().with(|report| report.quantities = vec![Quantity::Kappa]));
+    /// let mut simulation = builder.build()?;
+    /// assert_eq!(simulation.step()?.bodies[0].substeps, 7);
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    #[must_use]
+    pub fn with(mut self, change: impl FnOnce(&mut BodySpec)) -> Self {
+        change(&mut self.spec);
+        self
+    }
 }
 
 /// The index of a body of a simulation, in the order in which bodies were added.
