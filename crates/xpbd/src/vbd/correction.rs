@@ -184,15 +184,24 @@ impl<R: Float> CoarseCorrection<R> {
         })
     }
 
-    /// Updates the correction after its stars were rebuilt, for example after a cut. Particles keep their aggregates,
-    /// new ones join those around them, and the factor stays in use. When it has aged, as many aggregates are grown
-    /// again, larger ones if cuts have added particles. O(pairs).
+    /// Updates the correction after its stars were updated or rebuilt, for example after a cut. Particles keep their
+    /// aggregates, new ones join those around them, and the factor stays in use. When it has aged, as many aggregates are
+    /// grown again, larger ones if cuts have added particles. O(changed stars) and a copy of the rest after an update,
+    /// O(pairs) after a rebuild.
     pub fn sync(&mut self, stars: &VertexStars<R>) {
         let old = std::mem::replace(&mut self.order, stars.data.order.clone());
         self.matrix.sync(&stars.data);
         self.coarse.sync(&old, &self.order, &self.matrix);
         self.filled = None;
         self.is_cut = true;
+    }
+
+    /// Compares the pattern of the matrix with that of the stars. O(pairs).
+    ///
+    /// # Errors
+    /// [`XpbdError::Layout`] if it is another one.
+    pub fn check(&self, stars: &VertexStars<R>) -> Result<(), XpbdError> {
+        self.matrix.check(&stars.data)
     }
 
     /// Returns the number of aggregates.
