@@ -34,7 +34,7 @@ pub(super) struct StarData<R: Float> {
     /// Particle -> its position in the order.
     pub(super) row_of: Vec<u32>,
     /// Of each row, where it was before the last update if neither its terms nor the order of its neighbors has changed
-    /// since, else [`NONE`]. Empty after a rebuild.
+    /// since, else `u32::MAX`. Empty after a rebuild.
     pub(super) kept: Vec<u32>,
     /// Of each row before the last update, where it is now. Empty after a rebuild.
     pub(super) moved: Vec<u32>,
