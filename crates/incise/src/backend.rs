@@ -321,11 +321,12 @@ impl AnySolver {
             }
             solver.check_layout(schedule).map_err(|error| Error::Inconsistent(error.to_string()))?;
         });
-        #[cfg(feature = "gpu")]
-        if let Self::Device(device) = self {
-            device.solver.check(schedule)?;
+        match self {
+            Self::Single(backend) => backend.check_vbd(),
+            Self::Double(backend) => backend.check_vbd(),
+            #[cfg(feature = "gpu")]
+            Self::Device(device) => Ok(device.solver.check(schedule)?),
         }
-        Ok(())
     }
 
     /// The solver on a device, if it is on one.
@@ -353,6 +354,13 @@ impl<R: Real> Backend<R> {
             solver: Solver::new(positions),
             vbd: None,
         }
+    }
+
+    fn check_vbd(&self) -> Result<(), Error> {
+        let checked = self.vbd.as_ref().map(|vbd| vbd.check(&self.solver));
+        checked
+            .unwrap_or(Ok(()))
+            .map_err(|error| Error::Inconsistent(error.to_string()))
     }
 
     fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
@@ -451,9 +459,10 @@ impl<R: Real> SolverBackend for Backend<R> {
         Some(self.solver.max_speed())
     }
 
-    fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error> {
+    fn update_vbd(&mut self, changed: Option<&[u32]>, ms: &mut Milliseconds) -> Result<(), Error> {
         let Self { solver, vbd } = self;
-        vbd.as_mut().map_or(Ok(()), |vbd| vbd.sync(solver, ms))
+        vbd.as_mut()
+            .map_or(Ok(()), |vbd| vbd.sync(solver, changed, ms))
     }
 
     fn vbd_error(&self) -> Option<f64> {

@@ -112,7 +112,7 @@ impl SolverBackend for Device {
         None
     }
 
-    fn update_vbd(&mut self, _: &mut Milliseconds) -> Result<(), Error> {
+    fn update_vbd(&mut self, _: Option<&[u32]>, _: &mut Milliseconds) -> Result<(), Error> {
         Ok(())
     }
 

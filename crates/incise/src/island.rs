@@ -450,7 +450,7 @@ impl Island {
         self.constraints.distances.hand_to(&mut self.solver)?;
         self.solver
             .backend_mut()
-            .update_vbd(&mut Milliseconds::default())?;
+            .update_vbd(None, &mut Milliseconds::default())?;
         self.wake();
         Ok(())
     }
@@ -650,7 +650,15 @@ impl Island {
                 &self.partition.schedule,
             )?;
         }
-        self.solver.backend_mut().update_vbd(ms)?;
+        let added = delta.added.iter().map(|tet| delta.slot_after(tet.tet));
+        let relinked = delta.relinked.iter().map(|tet| delta.slot_after(tet.tet));
+        let moved = delta.moved.iter().map(|tet| tet.to);
+        let changed: Vec<u32> = added
+            .chain(relinked)
+            .chain(moved)
+            .map(|tet| tet.0)
+            .collect();
+        self.solver.backend_mut().update_vbd(Some(&changed), ms)?;
         self.solver
             .backend_mut()
             .lay_out(&self.partition.schedule, ms)?;

@@ -72,7 +72,7 @@ pub(crate) trait SolverBackend {
     fn host_max_speed(&self) -> Option<f64>;
 
     /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
-    fn update_vbd(&mut self, ms: &mut Milliseconds) -> Result<(), Error>;
+    fn update_vbd(&mut self, changed: Option<&[u32]>, ms: &mut Milliseconds) -> Result<(), Error>;
 
     /// The error that the last frame of two-level VBD left over.
     fn vbd_error(&self) -> Option<f64>;

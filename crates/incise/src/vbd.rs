@@ -2,8 +2,7 @@
 //!
 //! VBD visits particles, so these have their own colors; tets, clusters and their colors are kept for reports and
 //! renderers. After a cut particles keep their colors; only new ones, and those that now share a tet with one of their
-//! color, are colored again. Cost: O(tets) after each cut, since the stars of all particles are rebuilt and all tets
-//! are checked.
+//! color, are colored again. Cost after a cut: O(changed stars), and a copy of the others.
 
 use incise_coloring::auto;
 use incise_graph::{Clustering, ColorId, Coloring, Incidence, Schedule};
@@ -36,8 +35,7 @@ const MORE_COLORS: usize = 3;
 #[cfg_attr(feature = "save", serde(bound = ""))]
 pub(crate) struct Vbd<R: Real> {
     stars: VertexStars<R>,
-    /// The color of each particle, and how many there were when all were colored.
-    colors: Vec<Option<u32>>,
+    /// Number of colors when all particles were colored.
     color_count: usize,
     /// Coarse correction, for two-level VBD.
     correction: Option<CoarseCorrection<R>>,
@@ -59,7 +57,6 @@ impl<R: Real> Vbd<R> {
             .transpose()?;
         Ok(Self {
             stars,
-            colors: numbers(&coloring),
             color_count: coloring.color_count(),
             correction,
             accuracy: spec.accuracy,
@@ -73,25 +70,42 @@ impl<R: Real> Vbd<R> {
         self.stars.bytes() + self.correction.as_ref().map_or(0, CoarseCorrection::bytes)
     }
 
-    /// Updates stars, colors and correction after the solver has applied a cut.
-    pub(crate) fn sync(&mut self, solver: &Solver<R>, ms: &mut Milliseconds) -> Result<(), Error> {
-        let start = Instant::now();
-        let incidence = solver.star_incidence();
-        let mut coloring = recolor(&mut self.colors, &incidence);
-        if coloring.color_count() > self.color_count + MORE_COLORS {
-            coloring = auto(&incidence).coloring;
-            self.colors = numbers(&coloring);
-            self.color_count = coloring.color_count();
+    /// Updates stars, colors and correction after tets of the solver have changed: those in `changed`, by their numbers
+    /// now, if it is known which. Without it, and where [`VertexStars::update`] cannot follow, all are rebuilt.
+    pub(crate) fn sync(
+        &mut self,
+        solver: &Solver<R>,
+        changed: Option<&[u32]>,
+        ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        let mut start = Instant::now();
+        let is_updated = changed.is_some_and(|changed| self.stars.update(solver, changed));
+        if !is_updated || self.stars.color_count() > self.color_count + MORE_COLORS {
+            let incidence = solver.star_incidence();
+            let mut coloring = recolor(&self.stars.coloring(), &incidence);
+            if coloring.color_count() > self.color_count + MORE_COLORS {
+                coloring = auto(&incidence).coloring;
+                self.color_count = coloring.color_count();
+            }
+            ms.color += milliseconds(start.elapsed());
+            start = Instant::now();
+            self.stars
+                .rebuild(solver, &incidence, &schedule(&coloring))?;
         }
-        let schedule = schedule(&coloring);
-        ms.color += milliseconds(start.elapsed());
-        let start = Instant::now();
-        self.stars.rebuild(solver, &incidence, &schedule)?;
         if let Some(correction) = &mut self.correction {
             correction.sync(&self.stars);
         }
         ms.schedule += milliseconds(start.elapsed());
         Ok(())
+    }
+
+    /// Compares stars, colors and the pattern of the correction with rebuilt ones.
+    pub(crate) fn check(&self, solver: &Solver<R>) -> Result<(), incise_xpbd::XpbdError> {
+        self.stars.check(solver)?;
+        match &self.correction {
+            Some(correction) => correction.check(&self.stars),
+            None => Ok(()),
+        }
     }
 
     /// Advances a solver by one frame.
@@ -121,18 +135,10 @@ fn schedule(coloring: &Coloring) -> Schedule {
     Schedule::new(&Clustering::none(coloring.colors().len()), coloring)
 }
 
-/// The number of each color.
-fn numbers(coloring: &Coloring) -> Vec<Option<u32>> {
-    coloring
-        .colors()
-        .iter()
-        .map(|color| Some(color.0))
-        .collect()
-}
-
 /// Colors particles after a cut: those without a color and one of each pair that is in conflict get the smallest color
 /// that is free. `incidence` is that of the stars, with particles as constraints on tets. O(pairs).
-fn recolor(colors: &mut Vec<Option<u32>>, incidence: &Incidence) -> Coloring {
+fn recolor(colors: &Coloring, incidence: &Incidence) -> Coloring {
+    let mut colors: Vec<_> = colors.colors().iter().map(|color| Some(color.0)).collect();
     colors.resize(incidence.constraint_count(), None);
     for element in 0..incidence.particle_count() {
         let corners = incidence.constraints_of(element);

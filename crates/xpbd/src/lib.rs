@@ -69,6 +69,7 @@ mod substep;
 mod team;
 mod tets;
 mod vbd;
+mod wide;
 
 pub use changes::Changes;
 pub use collider::{Collider, ColliderShape};

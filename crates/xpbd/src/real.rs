@@ -58,10 +58,11 @@ macro_rules! real {
                 correction: Option<&mut CoarseCorrection<Self>>,
                 settings: &VbdSettings,
             ) -> Result<VbdReport, XpbdError> {
-                match correction {
+                // On a thread of the pool from the start: each parallel loop would wake one otherwise.
+                rayon::scope(|_| match correction {
                     None => solver.frame_of_sweeps(stars, settings),
                     Some(correction) => solver.frame_of_corrections(stars, correction, settings),
-                }
+                })
             }
             #[inline(never)]
             fn lay_out(solver: &mut Solver<Self>, schedule: &Schedule) {

@@ -326,6 +326,8 @@ fn memory_of_two_level_vbd_follows_the_tets_through_many_cuts() {
                 .with_snap(0.0),
             )
             .unwrap();
+        // Stars, colors and the pattern of the matrix are those of a rebuild.
+        simulation.check().unwrap();
         // The factor ages.
         for _ in 0..4 {
             simulation.step().unwrap();

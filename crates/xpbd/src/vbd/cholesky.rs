@@ -10,6 +10,8 @@
 
 use std::ops::Range;
 
+use crate::wide::wide;
+
 /// Lanes of a dot product. Rows begin at a multiple of them, so that no sum depends on what is left out.
 const LANES: usize = 8;
 
@@ -69,6 +71,14 @@ impl Cholesky {
 
     /// Replaces the matrix by its factor.
     pub(super) fn factor(&mut self) {
+        wide(
+            #[inline(always)]
+            || self.factor_rows(),
+        );
+    }
+
+    #[inline(always)]
+    fn factor_rows(&mut self) {
         for (i, (columns, offset)) in self.rows.iter().enumerate() {
             let first = columns.start;
             let (above, rest) = self.factor.split_at_mut(*offset);
@@ -92,31 +102,34 @@ impl Cholesky {
 
     /// Solves in place.
     pub(super) fn solve(&self, b: &mut [f64]) {
-        for i in 0..self.rows.len() {
-            let (first, row) = self.row(i);
-            b[i] = (b[i] - dot(row, &b[first..i])) * self.diagonal(i);
-        }
-        for i in (0..self.rows.len()).rev() {
-            let (first, row) = self.row(i);
-            b[i] *= self.diagonal(i);
-            let x = b[i];
-            for (b, l) in b[first..i].iter_mut().zip(row) {
-                *b -= l * x;
-            }
-        }
+        wide(
+            #[inline(always)]
+            || {
+                for i in 0..self.rows.len() {
+                    let (first, row) = self.row(i);
+                    b[i] = (b[i] - dot(row, &b[first..i])) * self.diagonal(i);
+                }
+                for i in (0..self.rows.len()).rev() {
+                    let (first, row) = self.row(i);
+                    b[i] *= self.diagonal(i);
+                    let x = b[i];
+                    for (b, l) in b[first..i].iter_mut().zip(row) {
+                        *b -= l * x;
+                    }
+                }
+            },
+        );
     }
 }
 
-#[inline]
+#[inline(always)]
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; LANES];
     let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
-    let tail: f64 = a
-        .remainder()
-        .iter()
-        .zip(b.remainder())
-        .map(|(x, y)| x * y)
-        .sum();
+    let mut tail = 0.0;
+    for (x, y) in a.remainder().iter().zip(b.remainder()) {
+        tail += x * y;
+    }
     for (a, b) in a.zip(b) {
         for k in 0..LANES {
             lanes[k] += a[k] * b[k];

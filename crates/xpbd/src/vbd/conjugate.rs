@@ -1,7 +1,7 @@
 //! [`Conjugate`]: preconditioned conjugate gradients for the matrix of a correction.
 //!
 //! The preconditioner is one symmetric cycle: a Gauss-Seidel sweep over the rows in the colors of the stars, the
-//! coarse correction, and a sweep backwards. Dot products are summed in double precision, row after row.
+//! coarse correction, and a sweep backwards (`smoother`). Dot products are summed in double precision, row after row.
 //!
 //! Each iteration lowers the energy `x·Ax/2 - b·x` by a gain that is at hand, and the gains of all iterations together
 //! are the energy between start and solution. So the last few gains tell what is left, which the residual does not
@@ -10,17 +10,10 @@
 //! Source of the estimate: Hestenes, Stiefel 1952; Strakoš, Tichý 2002.
 //! Cost of an iteration: three products, and a coarse solution.
 
-use std::ops::Range;
-
-use glam::DVec3;
-use rayon::prelude::*;
-
-use super::PARALLEL_ROWS;
-use super::block::{Block, apply, solve};
 use super::coarse::Coarse;
 use super::matrix::Blocks;
+use super::smoother::Smoother;
 use crate::Float;
-use crate::float::finite;
 
 /// When to stop.
 pub(super) struct Limits<E> {
@@ -44,18 +37,12 @@ pub(super) struct CgReport {
 /// Gains that say what was left before them: so many iterations late is the estimate, and so many are made at least.
 pub(super) const FEWEST_ITERATIONS: u32 = 4;
 
-/// Rows of a color that a thread relaxes at a time. Waking a thread costs as much as some hundred of them.
-const PARALLEL_RELAXED: usize = 512;
-
-/// Last digits of the trace that rounding may have taken from the pivots of a diagonal block.
-const ROUNDING: f64 = 4.0;
-
 /// The vectors of the iteration.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Conjugate<R: Float> {
-    inverses: Vec<Block<R>>,
+    smoother: Smoother<R>,
     solution: Vec<R::Vector>,
     residual: Vec<R::Vector>,
     direction: Vec<R::Vector>,
@@ -73,7 +60,7 @@ impl<R: Float> Conjugate<R> {
             &self.product,
             &self.preconditioned,
         ];
-        size_of_val(&*self.inverses) + vectors.map(|v| size_of_val(&**v)).iter().sum::<usize>()
+        self.smoother.bytes() + vectors.map(|v| size_of_val(&**v)).iter().sum::<usize>()
     }
 
     /// The result of [`Conjugate::solve`].
@@ -81,13 +68,9 @@ impl<R: Float> Conjugate<R> {
         &self.solution
     }
 
-    /// Inverts the diagonal blocks of a matrix, which solutions need until matrix or held rows change.
+    /// Takes the values of a matrix, which solutions need until matrix or held rows change.
     pub(super) fn prepare(&mut self, matrix: &Blocks<R>, held: &[bool]) {
-        (0..held.len())
-            .into_par_iter()
-            .with_min_len(PARALLEL_ROWS)
-            .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
-            .collect_into_vec(&mut self.inverses);
+        self.smoother.prepare(matrix, held);
     }
 
     /// Solves `A x = b` approximately. Rows that are held stay zero. The matrix must have been
@@ -173,65 +156,15 @@ impl<R: Float> Conjugate<R> {
         held: &[bool],
     ) {
         let Self {
-            inverses,
+            smoother,
             residual,
             preconditioned: z,
-            product,
             ..
         } = self;
-        // From zero, nothing right of the diagonal matters yet, and nothing but that is left over afterwards.
-        for color in colors.windows(2) {
-            relax(matrix, inverses, residual, z, color[0]..color[1], false);
-        }
-        matrix.multiply_upper(z, product);
-        coarse.correct::<R>(product, z, held);
-        for color in colors.windows(2).rev() {
-            relax(matrix, inverses, residual, z, color[0]..color[1], true);
-        }
+        let left = smoother.forward(matrix, colors, residual, z);
+        coarse.correct::<R>(left, z, held);
+        smoother.backward(matrix, colors, residual, z);
     }
-}
-
-/// Solves each row of a color for its own unknown. It sees the colors before its own and, on the way back, those after
-/// it; no two rows of a color are coupled.
-fn relax<R: Float>(
-    matrix: &Blocks<R>,
-    inverses: &[Block<R>],
-    b: &[R::Vector],
-    z: &mut [R::Vector],
-    rows: Range<usize>,
-    is_way_back: bool,
-) {
-    let start = rows.start;
-    let (before, rest) = z.split_at_mut(start);
-    let (own, after) = rest.split_at_mut(rows.len());
-    let (before, after) = (&*before, &*after);
-    own.par_iter_mut()
-        .with_min_len(PARALLEL_RELAXED)
-        .enumerate()
-        .for_each(|(k, z)| {
-            let row = start + k;
-            let mut force = matrix.without(b[row], matrix.lower(row), |column| before[column]);
-            if is_way_back {
-                force = matrix.without(force, matrix.upper(row), |column| after[column - rows.end]);
-            }
-            *z = apply::<R>(&inverses[row], force);
-        });
-}
-
-/// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal,
-/// so that it is as positive as the block was before rounding; zero if it has none or the row is held.
-fn inverse<R: Float>(block: &Block<R>, held: bool) -> Block<R> {
-    let columns = block.map(R::to_dvec3);
-    let trace = columns[0].x + columns[1].y + columns[2].z;
-    let rounding = ROUNDING * R::EPSILON.to_f64() * trace;
-    let [a, b, c] = columns.map(<f64 as Float>::components);
-    let h = [a[0], b[0], c[0], b[1], c[1], c[2]];
-    let [a, b, c] = DVec3::AXES.map(|axis| solve::<f64>(rounding, h, axis));
-    let inverse = [a, b, c].map(R::from_dvec3);
-    if held || !inverse.into_iter().all(finite::<R>) {
-        return [R::Vector::default(); 3];
-    }
-    inverse
 }
 
 fn dot<R: Float>(a: &[R::Vector], b: &[R::Vector]) -> f64 {

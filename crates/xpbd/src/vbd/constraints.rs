@@ -233,8 +233,8 @@ impl<R: Float> ConstraintTerms<R> {
             + size_of_val(&*self.anchor_of)
     }
 
-    /// Sorts the constraints of a solver by the particles of an order. O(constraints + particles), O(1) without any.
-    pub(super) fn rebuild(&mut self, solver: &Solver<R>, order: &[u32], incidence: &Incidence) {
+    /// Forgets all constraints and anchors.
+    pub(super) fn forget(&mut self) {
         self.offsets.clear();
         self.terms.clear();
         self.row_of.clear();
@@ -243,6 +243,12 @@ impl<R: Float> ConstraintTerms<R> {
         self.springs.clear();
         self.anchors.clear();
         self.anchor_of.clear();
+        (self.distance_count, self.volume_count) = (0, 0);
+    }
+
+    /// Sorts the constraints of a solver by the particles of an order. O(constraints + particles), O(1) without any.
+    pub(super) fn rebuild(&mut self, solver: &Solver<R>, order: &[u32], incidence: &Incidence) {
+        self.forget();
         self.distance_count = solver.distance_count();
         self.volume_count = solver.volume_count();
         if self.distance_count + self.volume_count == 0 {

@@ -12,7 +12,7 @@ use crate::particles::Particles;
 pub(super) const OTHERS: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [3, 0, 1], [2, 1, 0]];
 
 /// A tet seen from one of its particles: 32 bytes in single precision.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct CornerTerm<R> {
     /// The other particles, in an order that makes `n · a` positive at rest.
@@ -37,14 +37,17 @@ pub(super) struct Corner<R: Float> {
 
 impl<R: Float> CornerTerm<R> {
     /// The term with its own particle at `x`.
-    #[inline]
+    #[inline(always)]
     pub(super) fn at(&self, particles: &Particles<R>, x: R::Vector) -> Corner<R> {
-        let others = self.others.map(|p| particles.vector(p as usize) - x);
-        let ([a, b, c], [wa, wb, wc]) = (others, self.pulls);
+        // Written out: the closure of an array's `map` would be compiled without wide registers, as a call.
+        let ([p, q, r], [wa, wb, wc]) = (self.others, self.pulls);
+        let a = particles.vector(p as usize) - x;
+        let b = particles.vector(q as usize) - x;
+        let c = particles.vector(r as usize) - x;
         let slope = R::cross(b - a, c - a) * self.slope;
         let excess = R::dot(slope, a) - self.target;
         Corner {
-            others,
+            others: [a, b, c],
             slope,
             force: slope * excess - (a * wa + b * wb + c * wc),
         }

@@ -22,7 +22,7 @@ use crate::neo_hookean::TetConstraint;
 const ROOT_STEPS: usize = 6;
 
 /// `√(lV) (det F - γ)` of a tet with its corners at `x`, held within the bounds; 0 for what is not finite.
-#[inline]
+#[inline(always)]
 pub(super) fn held_excess<R: Float>(tet: &TetConstraint<R>, x: [R::Vector; 4]) -> R {
     let q = &tet.inverse_rest;
     let (e1, e2, e3) = (x[1] - x[0], x[2] - x[0], x[3] - x[0]);
@@ -36,7 +36,7 @@ pub(super) fn held_excess<R: Float>(tet: &TetConstraint<R>, x: [R::Vector; 4]) -
 }
 
 /// The pressure p held within its bounds; p and l in units of μ.
-#[inline]
+#[inline(always)]
 fn held<R: Float>(pressure: R, f: [R::Vector; 3], l: R) -> R {
     let [f1, f2, f3] = f;
     let [half, two, three] = [0.5, 2.0, 3.0].map(R::from_f64);
@@ -51,6 +51,10 @@ fn held<R: Float>(pressure: R, f: [R::Vector; 3], l: R) -> R {
     let extreme = m.sqrt();
     let rho = third / (m * extreme);
     if pressure >= R::ZERO {
+        // No root is above 2.
+        if pressure <= R::ONE / (extreme * two) {
+            return pressure;
+        }
         let high = R::ONE / (extreme * largest_root(-rho));
         return if pressure > high { high } else { pressure };
     }
@@ -58,14 +62,17 @@ fn held<R: Float>(pressure: R, f: [R::Vector; 3], l: R) -> R {
     let q = m * m - second / three;
     let q = if q > R::ZERO { q } else { R::ZERO };
     let spread = q.sqrt();
-    let value = ((m - first) * m + second) * m - third * third;
-    let turn = if spread > R::ZERO {
-        -half * value / (q * spread)
-    } else {
-        R::ONE
-    };
-    let low = -(R::ONE / (m + spread * largest_root(turn)).sqrt());
-    let p = if pressure < low { low } else { pressure };
+    let mut p = pressure;
+    if pressure * pressure * (m + two * spread) > R::ONE {
+        let value = ((m - first) * m + second) * m - third * third;
+        let turn = if spread > R::ZERO {
+            -half * value / (q * spread)
+        } else {
+            R::ONE
+        };
+        let low = -(R::ONE / (m + spread * largest_root(turn)).sqrt());
+        p = if pressure < low { low } else { pressure };
+    }
     let made_up = l * (second - two * p * third * first + three * p * p * third * third);
     if R::ONE - p * p * first + two * p * p * p * third + made_up >= R::ZERO {
         return p;
@@ -75,7 +82,7 @@ fn held<R: Float>(pressure: R, f: [R::Vector; 3], l: R) -> R {
 }
 
 /// The largest root of `t³ - 3t = 2ρ`, from 1 to 2, or up to 2.1 % more; ρ lies between -1 and 1.
-#[inline]
+#[inline(always)]
 fn largest_root<R: Float>(rho: R) -> R {
     let [two, three] = [2.0, 3.0].map(R::from_f64);
     let mut t = two;

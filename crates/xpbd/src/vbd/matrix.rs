@@ -8,10 +8,11 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::PARALLEL_ROWS;
-use super::block::{Block, apply};
+use super::block::{Block, row_product};
 use super::row_slices::threads_for;
 use super::stars::StarData;
-use crate::Float;
+use crate::wide::wide;
+use crate::{Float, XpbdError};
 
 /// A symmetric matrix of blocks with the pattern of a mesh.
 #[derive(Clone, Debug)]
@@ -31,53 +32,56 @@ pub(super) struct Blocks<R: Float> {
     pub(super) block_indices: Vec<[u32; 3]>,
     /// The held excess of each tet.
     pub(super) excess: Vec<R>,
+    /// That of the stars whose pattern it has.
+    revision: u64,
 }
 
 /// The pattern of consecutive rows.
+#[derive(Default)]
 struct Pattern {
     columns: Vec<u32>,
     block_indices: Vec<[u32; 3]>,
     /// For each row the end of its blocks up to the diagonal, and the end of all its blocks.
     rows: Vec<[usize; 2]>,
+    /// For each column the last row that has a block there, and the index of the block in that row.
+    seen: Vec<(u32, u32)>,
 }
 
 impl Pattern {
-    fn new<R: Float>(stars: &StarData<R>, row_of: &[u32], rows: Range<usize>) -> Self {
-        let mut columns = Vec::new();
-        let mut block_indices = Vec::new();
-        let mut ends = Vec::with_capacity(rows.len());
-        // For each column the last row that has a block there, and the index of the block in that row.
-        let mut seen = vec![(u32::MAX, 0u32); row_of.len()];
-        for row in rows {
-            let diagonal = u32::try_from(row).expect("particles are numbered in 32 bits");
-            let first = columns.len();
-            columns.push(diagonal);
-            seen[row].0 = diagonal;
-            let of_tets = stars.of(row).iter().flat_map(|term| term.others);
-            for p in of_tets.chain(stars.constraints.neighbors(row)) {
-                let column = row_of[p as usize];
-                let mark = &mut seen[column as usize].0;
-                if *mark != diagonal {
-                    *mark = diagonal;
-                    columns.push(column);
-                }
-            }
-            let beside = &mut columns[first + 1..];
-            beside.sort_unstable();
-            let below = first + 1 + beside.partition_point(|&column| column < diagonal);
-            for (block, &column) in (1u32..).zip(&*beside) {
-                seen[column as usize].1 = block;
-            }
-            let terms = stars.of(row).iter();
-            block_indices
-                .extend(terms.map(|term| term.others.map(|p| seen[row_of[p as usize] as usize].1)));
-            ends.push([below, columns.len()]);
-        }
+    fn with_rows(rows: usize) -> Self {
         Self {
-            columns,
-            block_indices,
-            rows: ends,
+            seen: vec![(u32::MAX, 0); rows],
+            ..Self::default()
         }
+    }
+
+    /// Appends a row.
+    fn push<R: Float>(&mut self, stars: &StarData<R>, row: usize) {
+        let (columns, seen) = (&mut self.columns, &mut self.seen);
+        let diagonal = u32::try_from(row).expect("particles are numbered in 32 bits");
+        let first = columns.len();
+        columns.push(diagonal);
+        seen[row].0 = diagonal;
+        let of_tets = stars.of(row).iter().flat_map(|term| term.others);
+        for p in of_tets.chain(stars.constraints.neighbors(row)) {
+            let column = stars.row_of[p as usize];
+            let mark = &mut seen[column as usize].0;
+            if *mark != diagonal {
+                *mark = diagonal;
+                columns.push(column);
+            }
+        }
+        let beside = &mut columns[first + 1..];
+        beside.sort_unstable();
+        let below = first + 1 + beside.partition_point(|&column| column < diagonal);
+        for (block, &column) in (1u32..).zip(&*beside) {
+            seen[column as usize].1 = block;
+        }
+        let block = |p: u32| seen[stars.row_of[p as usize] as usize].1;
+        let terms = stars.of(row).iter();
+        self.block_indices
+            .extend(terms.map(|term| term.others.map(block)));
+        self.rows.push([below, self.columns.len()]);
     }
 }
 
@@ -103,12 +107,14 @@ impl<R: Float> Blocks<R> {
             blocks: Vec::new(),
             block_indices: Vec::new(),
             excess: Vec::new(),
+            revision: 0,
         };
         blocks.sync(stars);
         blocks
     }
 
-    /// Takes the pattern of other stars; memory is used again. O(pairs + blocks log valence).
+    /// Takes the pattern of other stars; memory is used again, and values are undefined until they are filled.
+    /// O(pairs + blocks log valence), or a copy of the rows that an update of the stars has kept.
     pub(super) fn sync(&mut self, stars: &StarData<R>) {
         let Self {
             offsets,
@@ -117,24 +123,49 @@ impl<R: Float> Blocks<R> {
             columns,
             blocks,
             block_indices,
+            revision,
             ..
         } = self;
         let rows = stars.order.len();
-        let mut row_of = vec![0u32; rows];
-        for (row, &p) in (0u32..).zip(&stars.order) {
-            row_of[p as usize] = row;
-        }
+        let is_updated = stars.moved.len() == upper.len()
+            && stars.kept.len() == rows
+            && stars.revision == *revision + 1;
+        let patterns = if is_updated {
+            let mut pattern = Pattern::with_rows(rows);
+            for (row, &before) in stars.kept.iter().enumerate() {
+                let before = before as usize;
+                if before >= upper.len() {
+                    pattern.push(stars, row);
+                    continue;
+                }
+                let first = pattern.columns.len();
+                let own = &columns[offsets[before]..offsets[before + 1]];
+                let own = own.iter().map(|&column| stars.moved[column as usize]);
+                pattern.columns.extend(own);
+                let pairs = stars.offsets_before[before]..stars.offsets_before[before + 1];
+                pattern
+                    .block_indices
+                    .extend_from_slice(&block_indices[pairs]);
+                let below = first + upper[before] - offsets[before];
+                pattern.rows.push([below, pattern.columns.len()]);
+            }
+            vec![pattern]
+        } else {
+            let parts = threads_for(rows);
+            let range = |part| rows * part / parts..rows * (part + 1) / parts;
+            let patterns = (0..parts).into_par_iter().map(|part| {
+                let mut pattern = Pattern::with_rows(rows);
+                range(part).for_each(|row| pattern.push(stars, row));
+                pattern
+            });
+            patterns.collect()
+        };
+        *revision = stars.revision;
         offsets.clear();
         offsets.push(0);
         upper.clear();
         columns.clear();
         block_indices.clear();
-        let parts = threads_for(rows);
-        let range = |part| rows * part / parts..rows * (part + 1) / parts;
-        let patterns = (0..parts).into_par_iter();
-        let patterns: Vec<Pattern> = patterns
-            .map(|part| Pattern::new(stars, &row_of, range(part)))
-            .collect();
         for pattern in patterns {
             let first = columns.len();
             columns.extend_from_slice(&pattern.columns);
@@ -144,7 +175,6 @@ impl<R: Float> Blocks<R> {
                 offsets.push(first + end);
             }
         }
-        blocks.clear();
         blocks.resize(columns.len(), [R::Vector::default(); 3]);
         // Rows come in ascending order, so the transposes in a row are met from its first block on.
         let mut next: Vec<usize> = offsets[..rows].iter().map(|first| first + 1).collect();
@@ -178,36 +208,16 @@ impl<R: Float> Blocks<R> {
 
     /// `y = A x`.
     pub(super) fn multiply(&self, x: &[R::Vector], y: &mut [R::Vector]) {
-        self.each_row(y, |row| {
-            let all = self.offsets[row]..self.offsets[row + 1];
-            -self.without(R::Vector::default(), all, |column| x[column])
-        });
-    }
-
-    /// `y = -U x` with U what is right of the diagonal.
-    pub(super) fn multiply_upper(&self, x: &[R::Vector], y: &mut [R::Vector]) {
-        self.each_row(y, |row| {
-            self.without(R::Vector::default(), self.upper(row), |column| x[column])
-        });
-    }
-
-    pub(super) fn each_row(&self, y: &mut [R::Vector], value: impl Fn(usize) -> R::Vector + Sync) {
-        let rows = y.par_iter_mut().with_min_len(PARALLEL_ROWS).enumerate();
-        rows.for_each(|(row, y)| *y = value(row));
-    }
-
-    /// `b` less some blocks times the vectors of their columns.
-    #[inline]
-    pub(super) fn without(
-        &self,
-        mut b: R::Vector,
-        range: Range<usize>,
-        x: impl Fn(usize) -> R::Vector,
-    ) -> R::Vector {
-        for (&column, block) in self.columns[range.clone()].iter().zip(&self.blocks[range]) {
-            b = b - apply::<R>(block, x(column as usize));
-        }
-        b
+        each_row(
+            y,
+            PARALLEL_ROWS,
+            #[inline(always)]
+            |row| {
+                let all = self.offsets[row]..self.offsets[row + 1];
+                let (columns, blocks) = (&self.columns[all.clone()], &self.blocks[all]);
+                row_product::<R>(columns, blocks, |column| x[column])
+            },
+        );
     }
 
     /// The blocks of a row left of the diagonal.
@@ -218,6 +228,24 @@ impl<R: Float> Blocks<R> {
     /// The blocks of a row right of the diagonal.
     pub(super) fn upper(&self, row: usize) -> Range<usize> {
         self.upper[row]..self.offsets[row + 1]
+    }
+
+    /// Compares the pattern with a rebuilt one.
+    ///
+    /// # Errors
+    /// [`XpbdError::Layout`] if it differs.
+    pub(super) fn check(&self, stars: &StarData<R>) -> Result<(), XpbdError> {
+        let rebuilt = Self::new(stars);
+        let is_same = self.offsets == rebuilt.offsets
+            && self.upper == rebuilt.upper
+            && self.mirrors == rebuilt.mirrors
+            && self.columns == rebuilt.columns
+            && self.block_indices == rebuilt.block_indices
+            && self.blocks.len() == rebuilt.blocks.len();
+        let what = "pattern of blocks";
+        is_same
+            .then_some(())
+            .ok_or(XpbdError::Layout { what, number: 0 })
     }
 
     /// Whether this is the pattern of as many rows and pairs.
@@ -234,4 +262,24 @@ impl<R: Float> Blocks<R> {
             .map(|&c| c as usize)
             .zip(&self.blocks[range])
     }
+}
+
+/// Sets each element, `at_a_time` of them on a thread if there are enough for two.
+#[inline(always)]
+pub(super) fn each_row<V: Send>(y: &mut [V], at_a_time: usize, value: impl Fn(usize) -> V + Sync) {
+    let work = |first: usize, y: &mut [V]| {
+        wide(
+            #[inline(always)]
+            || {
+                for (row, y) in (first..).zip(y) {
+                    *y = value(row);
+                }
+            },
+        );
+    };
+    if y.len() < 2 * at_a_time {
+        return work(0, y);
+    }
+    let chunks = y.par_chunks_mut(at_a_time).enumerate();
+    chunks.for_each(|(chunk, y)| work(chunk * at_a_time, y));
 }

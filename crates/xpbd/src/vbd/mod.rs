@@ -32,6 +32,8 @@ mod matrix;
 mod newton_matrix;
 mod row_slices;
 mod settings;
+mod smoother;
+mod star_update;
 mod stars;
 mod start;
 mod state;

@@ -6,13 +6,17 @@
 use rayon::prelude::*;
 
 use super::PARALLEL_ROWS;
-use super::block::{add_cross, add_isotropic, add_outer};
+use super::block::Block;
 use super::hessian::held_excess;
-use super::matrix::Blocks;
+use super::matrix::{Blocks, each_row};
 use super::row_slices::row_slices;
 use super::vertex_stars::VertexStars;
 use crate::float::{load, weight};
+use crate::wide::wide;
 use crate::{Float, Solver};
+
+/// Tets a thread takes at a time.
+const PARALLEL_TETS: usize = 1024;
 
 impl<R: Float> Blocks<R> {
     /// Fills the matrix with the semidefinite second derivatives of the potential, and `force` with what is left over
@@ -25,15 +29,21 @@ impl<R: Float> Blocks<R> {
         held: &[bool],
         force: &mut [R::Vector],
     ) {
-        let tets = solver.tets.list.par_iter().with_min_len(PARALLEL_ROWS);
-        tets.map(|tet| {
-            held_excess(
-                tet,
-                tet.particles
-                    .map(|p| load::<R>(&solver.particles.cells[p as usize])),
-            )
-        })
-        .collect_into_vec(&mut self.excess);
+        self.excess.resize(solver.tet_count(), R::ZERO);
+        let tets = solver.tets.list.par_chunks(PARALLEL_TETS);
+        let excess = self.excess.par_chunks_mut(PARALLEL_TETS);
+        tets.zip(excess).for_each(|(tets, excess)| {
+            wide(
+                #[inline(always)]
+                || {
+                    for (tet, excess) in tets.iter().zip(excess) {
+                        let [a, b, c, d] = tet.particles;
+                        let at = |p: u32| load::<R>(&solver.particles.cells[p as usize]);
+                        *excess = held_excess(tet, [at(a), at(b), at(c), at(d)]);
+                    }
+                },
+            );
+        });
         let Self {
             offsets,
             upper,
@@ -43,7 +53,6 @@ impl<R: Float> Blocks<R> {
             excess,
             ..
         } = self;
-        let per_time_squared = R::ONE / (time * time);
         let mut rest = &mut force[..];
         let slices: Vec<_> = row_slices(offsets, blocks)
             .into_iter()
@@ -53,60 +62,41 @@ impl<R: Float> Blocks<R> {
                 (range, blocks, force)
             })
             .collect();
+        let fill = Fill {
+            solver,
+            stars,
+            time,
+            per_time_squared: R::ONE / (time * time),
+            excess,
+        };
         slices.into_par_iter().for_each(|(range, blocks, force)| {
             let first = offsets[range.start];
-            for (row, force) in range.zip(force) {
-                let blocks = &mut blocks[offsets[row] - first..offsets[row + 1] - first];
-                blocks.fill([R::Vector::default(); 3]);
-                *force = R::Vector::default();
-                if held[row] {
-                    continue;
-                }
-                let p = stars.data.order[row] as usize;
-                let particle = &solver.particles.cells[p];
-                let x = load::<R>(particle);
-                let inertia = per_time_squared / weight::<R>(particle);
-                let free = solver.particles.previous[p] + solver.particles.velocities[p] * time;
-                *force = (free - x) * inertia;
-                let mut isotropic = inertia;
-                let lower = upper[row] - offsets[row];
-                let pairs = stars.data.offsets[row]..stars.data.offsets[row + 1];
-                for pair in pairs {
-                    let term = &stars.data.terms[pair];
-                    let corner = term.at(&solver.particles, x);
-                    let ([a, b, c], slope) = (corner.others, corner.slope);
-                    *force += corner.force;
-                    let [wa, wb, wc] = term.pulls;
-                    isotropic -= wa + wb + wc;
-                    // Gradients of √(lV) det F at this particle (minus slope) and at the others.
-                    let held = term.slope * excess[stars.data.tets[pair] as usize];
-                    add_outer::<R>(&mut blocks[0], slope, slope);
-                    let around = [(a, b, c, wa), (b, c, a, wb), (c, a, b, wc)];
-                    for ((_, b, c, pull), block) in around.into_iter().zip(block_indices[pair]) {
-                        if block as usize >= lower {
+            wide(
+                #[inline(always)]
+                || {
+                    for (row, force) in range.zip(force) {
+                        let blocks = &mut blocks[offsets[row] - first..offsets[row + 1] - first];
+                        blocks.fill([R::Vector::default(); 3]);
+                        *force = R::Vector::default();
+                        if held[row] {
                             continue;
                         }
-                        let gradient = R::cross(b, c) * term.slope;
-                        let block = &mut blocks[block as usize];
-                        add_outer::<R>(block, -slope, gradient);
-                        add_isotropic::<R>(block, pull);
-                        // The second derivative of det F by this particle and a is that of -n / 6V.
-                        add_cross::<R>(block, (c - b) * -held);
+                        let lower = upper[row] - offsets[row];
+                        *force = fill.row(row, lower, block_indices, blocks);
+                        if let Some(viscosity) = &stars.viscosity {
+                            viscosity.add_blocks(row, blocks);
+                            *force += viscosity.force(row, &stars.data.order, |p| {
+                                load::<R>(&solver.particles.cells[p]) - solver.particles.previous[p]
+                            });
+                        }
+                        if !stars.data.constraints.is_empty() {
+                            let columns = &columns[offsets[row]..offsets[row + 1]];
+                            let terms = &stars.data.constraints;
+                            terms.add_row(solver, &stars.data.order, row, columns, blocks, force);
+                        }
                     }
-                }
-                add_isotropic::<R>(&mut blocks[0], isotropic);
-                if let Some(viscosity) = &stars.viscosity {
-                    viscosity.add_blocks(row, blocks);
-                    *force += viscosity.force(row, &stars.data.order, |p| {
-                        load::<R>(&solver.particles.cells[p]) - solver.particles.previous[p]
-                    });
-                }
-                if !stars.data.constraints.is_empty() {
-                    let columns = &columns[offsets[row]..offsets[row + 1]];
-                    let terms = &stars.data.constraints;
-                    terms.add_row(solver, &stars.data.order, row, columns, blocks, force);
-                }
-            }
+                },
+            );
         });
         self.mirror(held);
     }
@@ -121,28 +111,108 @@ impl<R: Float> Blocks<R> {
         force: &mut [R::Vector],
     ) {
         let per_time_squared = R::ONE / (time * time);
-        self.each_row(force, |row| {
-            if held[row] {
-                return R::Vector::default();
-            }
-            let p = stars.data.order[row] as usize;
-            let particle = &solver.particles.cells[p];
-            let x = load::<R>(particle);
-            let free = solver.particles.previous[p] + solver.particles.velocities[p] * time;
-            let mut force = (free - x) * (per_time_squared / weight::<R>(particle));
-            for term in stars.data.of(row) {
-                force += term.at(&solver.particles, x).force;
-            }
-            if let Some(viscosity) = &stars.viscosity {
-                force += viscosity.force(row, &stars.data.order, |p| {
-                    load::<R>(&solver.particles.cells[p]) - solver.particles.previous[p]
-                });
-            }
-            if !stars.data.constraints.is_empty() {
-                force += stars.data.constraints.force(solver, &stars.data.order, row);
-            }
-            force
-        });
+        each_row(
+            force,
+            PARALLEL_ROWS,
+            #[inline(always)]
+            |row| {
+                if held[row] {
+                    return R::Vector::default();
+                }
+                let p = stars.data.order[row] as usize;
+                let particle = &solver.particles.cells[p];
+                let x = load::<R>(particle);
+                let free = solver.particles.previous[p] + solver.particles.velocities[p] * time;
+                let mut force = (free - x) * (per_time_squared / weight::<R>(particle));
+                for term in stars.data.of(row) {
+                    force += term.at(&solver.particles, x).force;
+                }
+                if let Some(viscosity) = &stars.viscosity {
+                    force += viscosity.force(row, &stars.data.order, |p| {
+                        load::<R>(&solver.particles.cells[p]) - solver.particles.previous[p]
+                    });
+                }
+                if !stars.data.constraints.is_empty() {
+                    force += stars.data.constraints.force(solver, &stars.data.order, row);
+                }
+                force
+            },
+        );
+    }
+}
+
+/// What the rows of tets and inertia are filled from.
+struct Fill<'a, R: Float> {
+    solver: &'a Solver<R>,
+    stars: &'a VertexStars<R>,
+    time: R,
+    per_time_squared: R,
+    /// The held excess of each tet.
+    excess: &'a [R],
+}
+
+impl<R: Float> Fill<'_, R> {
+    /// Adds the terms of a row to the diagonal and to those of its blocks that come before number `lower`, and returns
+    /// the force.
+    #[inline(always)]
+    fn row(
+        &self,
+        row: usize,
+        lower: usize,
+        block_indices: &[[u32; 3]],
+        blocks: &mut [Block<R>],
+    ) -> R::Vector {
+        let data = &self.stars.data;
+        let particles = &self.solver.particles;
+        let p = data.order[row] as usize;
+        let particle = &particles.cells[p];
+        let x = load::<R>(particle);
+        let inertia = self.per_time_squared / weight::<R>(particle);
+        let free = particles.previous[p] + particles.velocities[p] * self.time;
+        let mut force = (free - x) * inertia;
+        let mut isotropic = inertia;
+        // xx, xy, xz, yy, yz, zz.
+        let mut h = [R::ZERO; 6];
+        let pairs = data.offsets[row]..data.offsets[row + 1];
+        let tets = data.tets[pairs.clone()].iter().zip(&block_indices[pairs]);
+        for (term, (&tet, &[ia, ib, ic])) in data.of(row).iter().zip(tets) {
+            let corner = term.at(particles, x);
+            let ([a, b, c], slope) = (corner.others, corner.slope);
+            force += corner.force;
+            let [wa, wb, wc] = term.pulls;
+            isotropic -= wa + wb + wc;
+            // Gradients of √(lV) det F at this particle (minus slope) and at the others.
+            let held = term.slope * self.excess[tet as usize];
+            let [u, v, w] = R::components(slope);
+            h[0] += u * u;
+            h[1] += u * v;
+            h[2] += u * w;
+            h[3] += v * v;
+            h[4] += v * w;
+            h[5] += w * w;
+            let mut add = |block: u32, b: R::Vector, c: R::Vector, pull: R| {
+                if block as usize >= lower {
+                    return;
+                }
+                let [x, y, z] = R::components(R::cross(b, c) * -term.slope);
+                // The second derivative of det F by this particle and a is that of -n / 6V.
+                let [p, q, r] = R::components((c - b) * -held);
+                let block = &mut blocks[block as usize];
+                block[0] += slope * x + R::vector(pull, r, -q);
+                block[1] += slope * y + R::vector(-r, pull, p);
+                block[2] += slope * z + R::vector(q, -p, pull);
+            };
+            add(ia, b, c, wa);
+            add(ib, c, a, wb);
+            add(ic, a, b, wc);
+        }
+        let [xx, xy, xz, yy, yz, zz] = h;
+        blocks[0] = [
+            R::vector(xx + isotropic, xy, xz),
+            R::vector(xy, yy + isotropic, yz),
+            R::vector(xz, yz, zz + isotropic),
+        ];
+        force
     }
 }
 

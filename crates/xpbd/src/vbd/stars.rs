@@ -6,14 +6,14 @@
 //! fifth of what the tets themselves need. Cost: 32 bytes a tet and corner in single precision, 56 in double, read once
 //! a sweep from front to back.
 
-use incise_graph::{DisjointSets, GraphError, Incidence, Schedule};
+use incise_graph::{Clustering, ColorId, Coloring, DisjointSets, GraphError, Incidence, Schedule};
 use rayon::prelude::*;
 
 use super::constraints::ConstraintTerms;
 use super::corner_term::{CornerTerm, takes_part};
 use super::row_slices::row_slices;
 use crate::constraints::ScalarConstraint;
-use crate::{Float, Solver};
+use crate::{Float, Solver, XpbdError};
 
 /// The tets and constraints of each particle, sorted by the particles of a schedule.
 #[derive(Clone, Debug)]
@@ -29,7 +29,19 @@ pub(super) struct StarData<R: Float> {
     pub(super) terms: Vec<CornerTerm<R>>,
     /// The tet of each term.
     pub(super) tets: Vec<u32>,
-    tet_count: usize,
+    /// The particles of each tet.
+    pub(super) corners: Vec<[u32; 4]>,
+    /// Particle -> its position in the order.
+    pub(super) row_of: Vec<u32>,
+    /// Of each row, where it was before the last update if neither its terms nor the order of its neighbors has changed
+    /// since, else `u32::MAX`. Empty after a rebuild.
+    pub(super) kept: Vec<u32>,
+    /// Of each row before the last update, where it is now. Empty after a rebuild.
+    pub(super) moved: Vec<u32>,
+    /// The ends of the terms before the last update.
+    pub(super) offsets_before: Vec<usize>,
+    /// Number of updates and rebuilds.
+    pub(super) revision: u64,
     /// The edge of a cube with the mean rest volume of a tet, in m: the scale of negligible lengths.
     pub(super) size: f64,
     /// Distances, volumes and attachments.
@@ -44,7 +56,12 @@ impl<R: Float> Default for StarData<R> {
             offsets: Vec::new(),
             terms: Vec::new(),
             tets: Vec::new(),
-            tet_count: 0,
+            corners: Vec::new(),
+            row_of: Vec::new(),
+            kept: Vec::new(),
+            moved: Vec::new(),
+            offsets_before: Vec::new(),
+            revision: 0,
             size: 0.0,
             constraints: ConstraintTerms::default(),
         }
@@ -105,13 +122,66 @@ impl<R: Float> StarData<R> {
                     (*term, *tet) = element;
                 }
             });
-        self.tet_count = solver.tet_count();
-        let volume = solver.tets.rest_volumes.iter().sum::<f64>();
-        self.size = (6.0 * volume / self.tet_count.max(1) as f64)
-            .max(0.0)
-            .cbrt();
+        self.corners.clear();
+        self.corners.extend(list.iter().map(|tet| tet.particles));
+        self.row_of.clear();
+        self.row_of.resize(self.order.len(), 0);
+        for (row, &p) in (0u32..).zip(&self.order) {
+            self.row_of[p as usize] = row;
+        }
+        self.kept.clear();
+        self.moved.clear();
+        self.revision += 1;
+        self.measure(solver);
         self.constraints.rebuild(solver, &self.order, incidence);
         Ok(())
+    }
+
+    /// Takes the mean size of the tets. O(tets).
+    pub(super) fn measure(&mut self, solver: &Solver<R>) {
+        let volume = solver.tets.rest_volumes.iter().sum::<f64>();
+        self.size = (6.0 * volume / solver.tet_count().max(1) as f64)
+            .max(0.0)
+            .cbrt();
+    }
+
+    /// Compares everything with stars rebuilt from the tets with the colors at hand, to the bit. O(tets).
+    ///
+    /// # Errors
+    /// [`XpbdError::Layout`] with the first particle that differs, or the colors if they are improper.
+    pub(super) fn check(&self, solver: &Solver<R>) -> Result<(), XpbdError> {
+        let schedule = Schedule::new(&Clustering::none(self.order.len()), &self.coloring());
+        let mut rebuilt = Self::default();
+        let what = "particle coloring";
+        rebuilt
+            .rebuild(solver, &solver.star_incidence(), &schedule)
+            .map_err(|source| XpbdError::Schedule { what, source })?;
+        let differs = |what, number| Err(XpbdError::Layout { what, number });
+        if self.order != rebuilt.order || self.row_of != rebuilt.row_of {
+            return differs("order of particles", 0);
+        }
+        if self.corners != rebuilt.corners || self.size.to_bits() != rebuilt.size.to_bits() {
+            return differs("list of tets", 0);
+        }
+        for row in 0..self.order.len() {
+            let tets = |data: &Self| data.tets[data.offsets[row]..data.offsets[row + 1]].to_vec();
+            let is_same = self.of(row) == rebuilt.of(row) && tets(self) == tets(&rebuilt);
+            if self.offsets[row + 1] != rebuilt.offsets[row + 1] || !is_same {
+                return differs("star", self.order[row] as usize);
+            }
+        }
+        Ok(())
+    }
+
+    /// The color of each particle.
+    pub(super) fn coloring(&self) -> Coloring {
+        let mut colors = vec![ColorId(0); self.order.len()];
+        for (color, rows) in (0u32..).zip(self.colors.windows(2)) {
+            for &p in &self.order[rows[0]..rows[1]] {
+                colors[p as usize] = ColorId(color);
+            }
+        }
+        Coloring::new(colors)
     }
 
     /// Bytes of all arrays.
@@ -121,6 +191,11 @@ impl<R: Float> StarData<R> {
             + size_of_val(&*self.offsets)
             + size_of_val(&*self.terms)
             + size_of_val(&*self.tets)
+            + size_of_val(&*self.corners)
+            + size_of_val(&*self.row_of)
+            + size_of_val(&*self.kept)
+            + size_of_val(&*self.moved)
+            + size_of_val(&*self.offsets_before)
             + self.constraints.bytes()
     }
 
@@ -150,7 +225,7 @@ impl<R: Float> StarData<R> {
     /// Tests whether the numbers of particles, tets and constraints are those of a solver.
     pub(super) fn fits(&self, solver: &Solver<R>) -> bool {
         self.order.len() == solver.particle_count()
-            && self.tet_count == solver.tet_count()
+            && self.corners.len() == solver.tet_count()
             && self.constraints.fits(solver)
     }
 }

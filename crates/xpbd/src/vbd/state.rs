@@ -11,6 +11,7 @@ use crate::Float;
 use crate::float::weight;
 use crate::forces::ForceMeter;
 use crate::neo_hookean::TetConstraint;
+use crate::wide::wide;
 
 /// Tets summed as one part: the same parts for any number of threads.
 const PARALLEL_TETS: usize = 2048;
@@ -29,14 +30,21 @@ impl<R: Float> ImplicitStep<'_, R> {
     pub(super) fn potentials(&self) -> Potential {
         let solver = &*self.solver;
         let elastic = |tets: &[TetConstraint<R>]| {
-            tets.iter().fold([0.0; 2], |[energy, terms], tet| {
-                let tet = tet.to_f64();
-                let own = energy_and_terms(
-                    &tet,
-                    tet.particles.map(|p| solver.particles.local(p as usize)),
-                );
-                [energy + own[0], terms + own[1]]
-            })
+            wide(
+                #[inline(always)]
+                || {
+                    let mut sums = [0.0; 2];
+                    for tet in tets {
+                        let tet = tet.to_f64();
+                        let [a, b, c, d] = tet.particles;
+                        let at = |p: u32| solver.particles.local(p as usize);
+                        let [energy, terms] = energy_and_terms(&tet, [at(a), at(b), at(c), at(d)]);
+                        sums[0] += energy;
+                        sums[1] += terms;
+                    }
+                    sums
+                },
+            )
         };
         let tets: Vec<[f64; 2]> = solver
             .tets
@@ -67,16 +75,23 @@ impl<R: Float> ImplicitStep<'_, R> {
         let solver = &*self.solver;
         let parts = &*self.stars.parts;
         let of = |p: u32| parts[p as usize] as usize;
-        let elastic: Vec<f64> = solver
-            .tets
-            .list
-            .par_iter()
-            .with_min_len(PARALLEL_TETS)
-            .map(|tet| {
-                let at = tet.particles.map(|p| solver.particles.local(p as usize));
-                energy_and_terms(&tet.to_f64(), at)[0]
-            })
-            .collect();
+        let mut elastic = vec![0.0; solver.tet_count()];
+        let chunks = elastic.par_chunks_mut(PARALLEL_TETS);
+        chunks
+            .zip(solver.tets.list.par_chunks(PARALLEL_TETS))
+            .for_each(|(energies, tets)| {
+                wide(
+                    #[inline(always)]
+                    || {
+                        for (energy, tet) in energies.iter_mut().zip(tets) {
+                            let [a, b, c, d] = tet.particles;
+                            let at = |p: u32| solver.particles.local(p as usize);
+                            let at = [at(a), at(b), at(c), at(d)];
+                            *energy = energy_and_terms(&tet.to_f64(), at)[0];
+                        }
+                    },
+                );
+            });
         for (tet, energy) in solver.tets.list.iter().zip(elastic) {
             sums[of(tet.particles[0])] += energy;
         }
@@ -260,7 +275,7 @@ pub(super) struct Potential {
 }
 
 /// The energy of a tet with its corners at `x`, 0 at rest, and the sum of the terms that it is the difference of.
-#[inline]
+#[inline(always)]
 fn energy_and_terms(tet: &TetConstraint<f64>, x: [DVec3; 4]) -> [f64; 2] {
     let q = DMat3::from_cols_array(&tet.inverse_rest).transpose();
     let f = DMat3::from_cols(x[1] - x[0], x[2] - x[0], x[3] - x[0]) * q;

@@ -7,6 +7,7 @@ use super::constraints::Local;
 use super::{ImplicitStep, VertexStars};
 use crate::constraints::outside;
 use crate::float::{finite, load, store, weight};
+use crate::wide::wide;
 use crate::{Float, Solver};
 
 /// Pairs of particle and tet in a color from which a second thread pays for its wake-up.
@@ -42,13 +43,25 @@ impl<R: Float> ImplicitStep<'_, R> {
             let rows = stars.data.colors[color]..stars.data.colors[color + 1];
             let pairs = stars.data.offsets[rows.end] - stars.data.offsets[rows.start];
             if threads == 1 || pairs < PARALLEL_PAIRS {
-                rows.for_each(|row| sweep.step_vbd(solver, stars, row));
+                wide(
+                    #[inline(always)]
+                    || {
+                        for row in rows {
+                            sweep.step_vbd(solver, stars, row);
+                        }
+                    },
+                );
             } else {
                 (0..threads).into_par_iter().for_each(|thread| {
                     let share = |part| rows.start + rows.len() * part / threads;
-                    for row in share(thread)..share(thread + 1) {
-                        sweep.step_vbd(solver, stars, row);
-                    }
+                    wide(
+                        #[inline(always)]
+                        || {
+                            for row in share(thread)..share(thread + 1) {
+                                sweep.step_vbd(solver, stars, row);
+                            }
+                        },
+                    );
                 });
             }
         }
@@ -57,7 +70,7 @@ impl<R: Float> ImplicitStep<'_, R> {
 
 impl<R: Float> Sweep<R> {
     /// Moves one particle into its minimum.
-    #[inline]
+    #[inline(always)]
     fn step_vbd(&self, solver: &Solver<R>, stars: &VertexStars<R>, row: usize) {
         let Solver {
             particles,

@@ -2,12 +2,12 @@
 //!
 //! It consists of the stars of all particles ([`StarData`]) and what VBD remembers from one substep to the next.
 
-use incise_graph::{GraphError, Incidence, Schedule};
+use incise_graph::{Coloring, GraphError, Incidence, Schedule};
 
 use super::history::History;
 use super::stars::StarData;
 use super::viscosity::Viscosity;
-use crate::{Float, Solver};
+use crate::{Float, Solver, XpbdError};
 
 /// The tets around each particle, sorted by the particles of a schedule, for VBD.
 ///
@@ -69,6 +69,51 @@ impl<R: Float> VertexStars<R> {
         Ok(())
     }
 
+    /// Updates the stars after a cut that has changed or appended the tets `changed`, by their numbers now, and removed
+    /// those from the present number on. Particles keep their colors; new ones, and those that now share a tet with one
+    /// of their color, get the smallest color that is free.
+    ///
+    /// Returns false, and has changed nothing, if the stars must be rebuilt: with distances or volumes, with fewer
+    /// particles than before, or if tets were appended that `changed` does not name.
+    ///
+    /// Deterministic. Cost: O(changed stars), and a copy of the rest.
+    ///
+    /// # Example
+    /// ```
+    /// use glam::DVec3;
+    /// use incise_graph::{Clustering, ColorId, Coloring, Schedule};
+    /// use incise_xpbd::{Material, Solver, VertexStars};
+    ///
+    /// let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::ONE];
+    /// let mut solver = Solver::<f64>::new(&rest);
+    /// solver.add_material(Material { young_modulus: 1e5, poisson_ratio: 0.3, density: 1e3, damping: 0.0 })?;
+    /// solver.push_tet([0, 1, 2, 3], [rest[0], rest[1], rest[2], rest[3]], 0);
+    /// let colors = Coloring::new([0, 1, 2, 3, 0].map(ColorId).to_vec());
+    /// let mut stars = VertexStars::new(&solver, &Schedule::new(&Clustering::none(5), &colors))?;
+    /// solver.push_tet([1, 4, 2, 3], [rest[1], rest[4], rest[2], rest[3]], 0);
+    /// assert!(stars.update(&solver, &[1]));
+    /// assert_eq!(stars.pair_count(), 8);
+    /// stars.check(&solver)?;
+    /// # Ok::<(), Box<dyn std::error::Error>>(())
+    /// ```
+    pub fn update(&mut self, solver: &Solver<R>, changed: &[u32]) -> bool {
+        if !self.data.update(solver, changed) {
+            return false;
+        }
+        self.parts.clear();
+        self.try_start = true;
+        self.viscosity = None;
+        true
+    }
+
+    /// Compares the stars with those rebuilt from the tets with the colors at hand, to the bit. O(tets).
+    ///
+    /// # Errors
+    /// [`XpbdError::Layout`] names the first difference, [`XpbdError::Schedule`] particles of one color in a tet.
+    pub fn check(&self, solver: &Solver<R>) -> Result<(), XpbdError> {
+        self.data.check(solver)
+    }
+
     /// Returns the bytes of all arrays. O(1).
     #[must_use]
     pub fn bytes(&self) -> usize {
@@ -83,6 +128,12 @@ impl<R: Float> VertexStars<R> {
     #[must_use]
     pub fn color_count(&self) -> usize {
         self.data.colors.len() - 1
+    }
+
+    /// Returns the color of each particle. O(particles).
+    #[must_use]
+    pub fn coloring(&self) -> Coloring {
+        self.data.coloring()
     }
 
     /// Returns the number of pairs of a particle and one of its tets, to which the cost of a sweep is proportional.
