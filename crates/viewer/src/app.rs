@@ -497,7 +497,7 @@ impl eframe::App for Viewer {
             .show(ui, |ui| self.picture(ui));
         self.windows(&context);
         #[cfg(target_family = "wasm")]
-        crate::web::publish(
+        crate::page::publish(
             self.session.as_ref().map(Session::report),
             self.error.as_ref().map(|error| error.text.as_str()),
         );

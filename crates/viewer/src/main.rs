@@ -14,6 +14,8 @@ mod load;
 #[cfg(not(target_family = "wasm"))]
 mod native;
 mod open_dialog;
+#[cfg(target_family = "wasm")]
+mod page;
 mod panel;
 mod session;
 mod setting_effects;

@@ -1,23 +1,19 @@
 //! The viewer on a web page: it draws on the page's canvas with WebGPU and simulates on the page's one thread.
 //!
-//! `?scene=FILE` in the page's address opens a scene, mesh or surface that lies beside the page. The canvas has the state
-//! as attributes, for the page's own scripts: `data-frame`, `data-tets`, `data-pieces` and, if there is one, `data-error`.
+//! `?scene=FILE` in the page's address opens a scene, mesh or surface that lies beside the page.
 
 use std::path::Path;
 
 use eframe::wasm_bindgen::{JsCast, JsValue};
 use eframe::{WebOptions, WebRunner, web_sys};
-use incise::report::FrameReport;
 use incise::scene::Backend;
 use web_sys::js_sys::Uint8Array;
-use web_sys::{Element, HtmlCanvasElement, Response, UrlSearchParams, Window};
+use web_sys::{HtmlCanvasElement, Response, UrlSearchParams, Window};
 
 use crate::app::Viewer;
 use crate::graphics;
 use crate::load::{Source, TETS};
-
-/// Identifier of the canvas on the page.
-const CANVAS: &str = "incise";
+use crate::page::{canvas, set};
 
 /// Starts the viewer; an error becomes the attribute `data-error` of the canvas.
 pub(crate) fn main() {
@@ -65,27 +61,4 @@ async fn fetch(window: &Window, address: &str) -> Result<Vec<u8>, JsValue> {
     }
     let bytes = wasm_bindgen_futures::JsFuture::from(response.array_buffer()?).await?;
     Ok(Uint8Array::new(&bytes).to_vec())
-}
-
-/// Sets the canvas's attributes to the state of a frame.
-pub(crate) fn publish(report: Option<&FrameReport>, error: Option<&str>) {
-    if let Some(report) = report {
-        set("data-frame", &report.frame.to_string());
-        set("data-tets", &report.tets.to_string());
-        set("data-pieces", &report.pieces.to_string());
-    }
-    if let Some(error) = error {
-        set("data-error", error);
-    }
-}
-
-fn canvas() -> Option<Element> {
-    web_sys::window()?.document()?.get_element_by_id(CANVAS)
-}
-
-fn set(name: &str, value: &str) {
-    if let Some(canvas) = canvas() {
-        // Only a malformed name could fail.
-        let _ = canvas.set_attribute(name, value);
-    }
 }

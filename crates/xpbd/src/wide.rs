@@ -4,9 +4,8 @@
 //! compiled a second time, with AVX2, and that is taken where the processor has it: four numbers in double precision in
 //! an instruction in place of two. Products and sums are not fused, so the bits are the same. Cost: a branch.
 
-use fearless_simd::Level;
 #[cfg(target_arch = "x86_64")]
-use fearless_simd::Simd;
+use fearless_simd::{Level, Simd};
 
 /// Calls `body`, compiled for the instructions of this processor. Functions that `body` calls have to be inlined.
 #[inline(always)]
