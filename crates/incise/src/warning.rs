@@ -196,12 +196,13 @@ pub(crate) fn box_text(bounds: &Bounds) -> String {
 }
 
 /// The warning about the substeps of bodies, if their expected error is too large. `wanted` is the accuracy that the
-/// scene states.
+/// scene states; `takes_vbd` whether VBD can solve all that the bodies have.
 pub(crate) fn of_substeps(
     bodies: &[usize],
     choice: &Choice,
     chosen: bool,
     wanted: Option<f64>,
+    takes_vbd: bool,
 ) -> Option<Warning> {
     let accuracy = wanted.unwrap_or(DEFAULT_ACCURACY);
     if choice.expected_error <= accuracy * (1.0 + 1e-9) {
@@ -219,8 +220,11 @@ pub(crate) fn of_substeps(
     );
     let capped = chosen && choice.shortfall == Some(Shortfall::Cap);
     let (code, fix) = if choice.nearly_incompressible {
-        let fix =
-            "Poisson's ratio is near 0.5: lower it, or set method = \"vbd\" and two_level = true";
+        let fix = if takes_vbd {
+            "Poisson's ratio is near 0.5: lower it, or set method = \"vbd\" and two_level = true"
+        } else {
+            "Poisson's ratio is near 0.5: lower it"
+        };
         (WarningCode::NearlyIncompressible, fix)
     } else if choice.shortfall == Some(Shortfall::Budget) {
         let fix = "raise budget_ms, use fewer tets or a softer material";
@@ -232,7 +236,11 @@ pub(crate) fn of_substeps(
         let message = format!("{error}; {fix}");
         return Some(Warning::new(WarningCode::SubstepsCapped, bodies, message));
     } else if capped {
-        let fix = "raise max_substeps, or set method = \"vbd\" and two_level = true";
+        let fix = if takes_vbd {
+            "raise max_substeps, or set method = \"vbd\" and two_level = true"
+        } else {
+            "raise max_substeps, or use larger tets or a softer material"
+        };
         (WarningCode::SubstepsCapped, fix)
     } else {
         (WarningCode::Inaccurate, "set substeps = \"auto\"")

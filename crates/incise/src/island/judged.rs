@@ -185,6 +185,8 @@ impl Island {
             &judged,
             chosen,
             spec.accuracy,
+            // VBD has no contact.
+            self.constraints.contacts.is_none(),
         ));
         let softened = each!(&self.solver, solver => solver.softened());
         if softened.tets > 0 {

@@ -1,8 +1,8 @@
 //! What `method = "auto"` and `budget_ms` choose, and what follows from it.
 
 use incise::report::{ChosenMethod, Shortfall};
-use incise::scene::{GroundSpec, Method, Precision};
-use incise::{Scene, Simulation, WarningCode};
+use incise::scene::{ContactSpec, GroundSpec, Method, Precision};
+use incise::{Scene, Simulation, Warning, WarningCode};
 
 use crate::support::{body, plane, scene, simulation, state};
 
@@ -203,6 +203,21 @@ fn bodies_that_move_slowly_keep_their_substeps() {
     assert_eq!(body.method.unwrap(), ChosenMethod::GaussSeidel);
     let codes: Vec<_> = report.warnings().iter().map(|w| w.code).collect();
     assert!(codes.contains(&WarningCode::SubstepsCapped), "{codes:?}");
+}
+
+/// The fix in the warning is VBD only where VBD can solve the scene: it refuses contact.
+#[test]
+fn warnings_do_not_advise_vbd_for_scenes_with_contact() {
+    for (contact, advises_vbd) in [(None, true), (Some(ContactSpec::default()), false)] {
+        let mut scene = beam("1e4", "accuracy = 0.01\nmax_substeps = 40");
+        scene.contact = contact;
+        let mut simulation = simulation(&scene);
+        let report = simulation.step().unwrap();
+        let is_capped = |warning: &&Warning| warning.code == WarningCode::SubstepsCapped;
+        let warning = report.warnings().iter().find(is_capped).unwrap();
+        assert!(warning.message.contains("max_substeps"), "{warning}");
+        assert_eq!(warning.message.contains("vbd"), advises_vbd, "{warning}");
+    }
 }
 
 /// A generous budget buys what more accuracy takes, a stated accuracy takes no more than it needs, and a budget for less
