@@ -7,8 +7,10 @@
 // The colliders of all substeps, one substep after the other; `Solver::collider_data` documents the numbers.
 @group(0) @binding(4) var<storage, read> colliders: array<f32>;
 
+// The last digit of a number near 1.
+const EPSILON: f32 = 1.1920929e-7;
 // Numbers of a collider.
-const NUMBERS: u32 = 20u;
+const NUMBERS: u32 = 22u;
 // Passes over the colliders for a particle that is inside of several.
 const ROUNDS: u32 = 32u;
 
@@ -90,17 +92,29 @@ fn nearest(at: u32, x: vec3<f32>) -> Nearest {
     return nearest_on_box(at, x);
 }
 
+// The distance from the surface, zero or negative, that a particle may keep which was at `before` before the substep.
+fn kept_distance(at: u32, before: vec3<f32>) -> f32 {
+    let kept = colliders[at + 20u];
+    if kept <= 0.0 {
+        return 0.0;
+    }
+    let x = before + vector(at + 4u);
+    let distance = nearest(at, x).distance;
+    let rounding = sqrt(x.x * x.x + x.y * x.y + x.z * x.z) * EPSILON * 4.0;
+    return select(0.0, kept * distance, distance < -(colliders[at + 21u] + rounding));
+}
+
 // Reduces the motion along the surface by at most the depth of the correction times the friction coefficient.
-fn rub(at: u32, surface: Nearest, before: vec3<f32>, x: vec3<f32>) -> vec3<f32> {
+fn rub(at: u32, surface: Nearest, kept: f32, before: vec3<f32>, x: vec3<f32>) -> vec3<f32> {
     let way = x - before - vector(at + 4u);
     let slide = way - surface.normal * dot(surface.normal, way);
     let length = sqrt(dot(slide, slide));
-    let hold = colliders[at + 1u] * -surface.distance;
+    let hold = colliders[at + 1u] * (kept - surface.distance);
     var share = settings.one;
     if length > hold {
         share = hold / length;
     }
-    return surface.point - slide * share;
+    return surface.point + surface.normal * kept - slide * share;
 }
 
 @compute @workgroup_size(64)
@@ -130,9 +144,12 @@ fn main(
         let surface = nearest(at, x);
         clear += 1u;
         if surface.distance < 0.0 {
-            x = rub(at, surface, before, x);
-            clear = 1u;
-            moved = true;
+            let kept = kept_distance(at, before);
+            if surface.distance < kept {
+                x = rub(at, surface, kept, before, x);
+                clear = 1u;
+                moved = true;
+            }
         }
         if clear == number {
             break;

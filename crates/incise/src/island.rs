@@ -13,7 +13,7 @@ use incise_cutting::{
     CutDelta, CuttableMesh, ImproveOptions, PieceEvent, PieceTracker, StrokeRegistry, improve,
     remove_tets,
 };
-use incise_mesh::{Bounds, ParticleId, TetId, signed_volume};
+use incise_mesh::{Bounds, ParticleId, TetId, TetMesh, signed_volume};
 use incise_xpbd::{DistanceConstraint, KappaLimit, SolidBlade, StepReport, StepSettings};
 use web_time::Instant;
 
@@ -118,6 +118,38 @@ const IMPROVED_TETS: usize = 1000;
 /// The improvement of a frame looks at one of so many tets of a larger island: a quarter of the time of 20 iterations.
 const IMPROVED_PART: usize = 8;
 
+/// The part of a body's size that a particle may start inside of a collider without a warning.
+const STARTING_DEPTH: f64 = 0.01;
+
+/// The warnings about bodies that start inside of a collider. O(particles · colliders).
+fn starts_inside(
+    scene: &Scene,
+    settings: &StepSettings,
+    joined: &IslandBuilder,
+    mesh: &TetMesh,
+) -> Vec<Warning> {
+    let grounds = usize::from(scene.world.ground.is_some());
+    let mut warnings = Vec::new();
+    for &body in &joined.bodies {
+        let of_body = |p: &usize| joined.body_of_particle[*p] as usize == body;
+        let particles = || (0..mesh.positions.len()).filter(of_body);
+        let size = Bounds::around(particles().map(|p| mesh.positions[p])).size();
+        let free = || particles().filter(|&p| !joined.fixed[p]);
+        for (number, collider) in settings.colliders.iter().enumerate() {
+            let depths = free().map(|p| -collider.distance(mesh.positions[p]).0);
+            let depth = depths.fold(0.0, f64::max);
+            if depth > STARTING_DEPTH * size.max_element() {
+                let name = match number.checked_sub(grounds) {
+                    Some(number) => format!("collider[{number}]"),
+                    None => "the ground".into(),
+                };
+                warnings.push(Warning::of_start_inside(body, depth, &name));
+            }
+        }
+    }
+    warnings
+}
+
 impl Island {
     pub(crate) fn new(
         scene: &Scene,
@@ -134,6 +166,7 @@ impl Island {
         let mut solver = joined.solver(precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
+        let overlaps = starts_inside(scene, &settings, &joined, cuttable.mesh());
         let is_open = leaves_open(scene, &joined.substeps, &settings, compute_device.is_gpu());
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
@@ -197,7 +230,7 @@ impl Island {
         island
             .judged
             .warnings
-            .extend(empty.map(Warning::of_empty_region));
+            .extend(empty.map(Warning::of_empty_region).chain(overlaps));
         Ok(island)
     }
 

@@ -38,6 +38,8 @@ pub enum WarningCode {
     OutsideAccuracy,
     /// A region of the scene contains no particle, or no tet.
     EmptyRegion,
+    /// A body starts inside the ground or a collider.
+    StartsInside,
     /// A stroke has ended without meeting a tet.
     StrokeMissed,
     /// A stroke has cut where pinned particles keep both sides together.
@@ -86,6 +88,15 @@ impl Warning {
             message: "the region contains nothing of the body: compare it with scale and position of the body".into(),
             location: field,
         }
+    }
+
+    /// The warning about a body that starts `depth` m inside of a collider.
+    pub(crate) fn of_start_inside(body: usize, depth: f64, collider: &str) -> Self {
+        let depth = rounded(depth);
+        let message = format!(
+            "it starts {depth} m inside {collider}, which pushes it out: move one of them by {depth} m"
+        );
+        Self::new(WarningCode::StartsInside, &[body], message)
     }
 
     /// The warning about a stroke that met no tet, at a place like `stroke[0]`, with the nearest body and its box when

@@ -4,7 +4,7 @@
 //! Tets, masses and materials are edited in the solver here; a GPU applies the same changes that the layout of this
 //! crate applies. Changes are tracked on request only. Cost: a number an edit.
 
-use crate::constraints::Obstacle;
+use crate::constraints::{Obstacle, kept_depth};
 use crate::layout::{CONSTANTS, REST};
 use crate::neo_hookean::MAX_COFACTOR_NORM;
 use crate::particles::Particles;
@@ -180,19 +180,21 @@ impl Solver<f32> {
     pub const MAX_COFACTOR_NORM: f64 = MAX_COFACTOR_NORM;
 
     /// Returns the colliders `elapsed` s after the start of the frame, at the end of a substep, relative to the origin,
-    /// as 20 numbers each.
+    /// as 22 numbers each.
     ///
     /// The first number is the kind: 0 plane, 1 capsule or sphere, 2 box; the second the friction; the fifth to seventh
     /// the motion in the substep. A plane has its offset along the normal third and the unit normal from the ninth on.
     /// A capsule has its radius third, one over the squared length of its axis fourth (0 for a sphere), and from the
     /// ninth on its start, its axis and the normal of points on the axis. A box has half its edges third, fourth and
-    /// eighth, and from the ninth on its center and its three axes.
+    /// eighth, and from the ninth on its center and its three axes. The last two are the part of a depth at the start of
+    /// the substep that is left at its end, and a depth that is rounding.
     pub fn collider_data<'a>(
         &self,
         settings: &'a StepSettings,
         elapsed: f64,
-    ) -> impl Iterator<Item = [f32; 20]> + use<'a> {
-        Obstacle::<f32>::place(settings, elapsed, self.particles.origin)
+    ) -> impl Iterator<Item = [f32; 22]> + use<'a> {
+        let kept = kept_depth(settings);
+        Obstacle::<f32>::place(settings, elapsed, self.particles.origin, kept)
             .map(|obstacle| obstacle.numbers())
     }
 }

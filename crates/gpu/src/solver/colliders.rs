@@ -2,7 +2,7 @@
 //!
 //! The host computes the poses at the end of each substep in its own precision; the kernel only computes nearest
 //! points. All colliders are sent together, and only if their values differ from those on the device: colliders at rest
-//! are sent once. Cost: 80 bytes per collider and substep.
+//! are sent once. Cost: 88 bytes per collider and substep.
 
 use incise_xpbd::{Solver, StepSettings};
 
@@ -14,10 +14,10 @@ use crate::{GpuContext, GpuError};
 /// The colliders of a frame.
 #[derive(Debug)]
 pub(crate) struct Colliders {
-    array: Array<[f32; 20]>,
+    array: Array<[f32; 22]>,
     /// The values on the device, and scratch memory for new ones.
-    sent: Vec<[f32; 20]>,
-    next: Vec<[f32; 20]>,
+    sent: Vec<[f32; 22]>,
+    next: Vec<[f32; 22]>,
 }
 
 impl Colliders {

@@ -1,9 +1,9 @@
 //! What happens after a cut: which parts fall, which hold, which spring back.
 
-use incise::Simulation;
 use incise::mesh::glam::DVec3;
 use incise::mesh::{ParticleId, TetId, TetMesh};
 use incise::scene::Precision;
+use incise::{Simulation, Warning, WarningCode};
 
 use crate::support::{body, plane, scene, simulation};
 
@@ -194,4 +194,46 @@ fn half_way_and_on() {
     // Cut at 0.6 of its length; chips may come off where it moved.
     let tip = volumes[1..].iter().fold(0.0, |a: f64, b| a.max(*b)) / volumes.iter().sum::<f64>();
     assert!((tip - 0.4).abs() < 0.02, "{volumes:?}");
+}
+
+/// A body that starts inside the ground or a collider is named with its depth, and rises without being torn: its fastest
+/// particle goes at the depth over 20 ms, twice that where it bulges.
+#[test]
+fn bodies_that_start_inside_colliders_are_named_and_rise_slowly() {
+    let body =
+        "[[body]]\nshape = { kind = \"box\", tets = 300 }\nscale = 0.2\nyoung_modulus = 1e4\n";
+    let ground = "[world]\nground = { height = -0.06 }\n";
+    let ball = "[[collider]]\nkind = \"sphere\"\ncenter = [0.0, 0.0, -0.3]\nradius = 0.24\n";
+    // The ball's top is between particles of the box, which lie less deep.
+    for (text, place) in [
+        (format!("{ground}{body}"), "0.04 m inside the ground"),
+        (format!("{body}{ball}"), "0.0376 m inside collider[0]"),
+    ] {
+        let mut simulation = simulation(&scene(&text));
+        let mut fastest = 0.0f64;
+        for frame in 0..20 {
+            let report = simulation.step().unwrap();
+            let is_named = |w: &&Warning| w.code == WarningCode::StartsInside;
+            let warning = report.warnings().iter().find(is_named);
+            if frame == 0 {
+                let warning = warning.unwrap_or_else(|| panic!("no warning: {text}"));
+                assert_eq!(warning.location, "body 0");
+                assert!(warning.message.contains(place), "{warning}");
+            }
+            let speeds = simulation.velocities().into_iter().map(DVec3::length);
+            fastest = speeds.fold(fastest, f64::max);
+        }
+        assert!(fastest > 1.0 && fastest < 4.0, "{place}: {fastest} m/s");
+    }
+    let apart = simulation(&scene(&format!(
+        "[world]\nground = {{ height = -0.1 }}\n{body}"
+    )))
+    .step()
+    .unwrap()
+    .warnings()
+    .to_vec();
+    assert!(
+        apart.iter().all(|w| w.code != WarningCode::StartsInside),
+        "{apart:?}"
+    );
 }

@@ -42,6 +42,21 @@ pub(crate) struct Nearest<R: Float> {
 }
 
 impl<R: Float> Solid<R> {
+    /// A distance from the origin that its numbers do not exceed: what rounding is relative to.
+    pub(crate) fn reach(&self) -> R {
+        let length = |v: R::Vector| R::dot(v, v).sqrt();
+        match *self {
+            Self::Plane { normal, offset } => length(normal * offset),
+            Self::Round {
+                start,
+                axis,
+                radius,
+                ..
+            } => length(start) + length(axis) + radius,
+            Self::Box { center, half, .. } => length(center) + (half[0] + half[1] + half[2]),
+        }
+    }
+
     pub(crate) fn new(shape: &ColliderShape) -> Self {
         match *shape {
             ColliderShape::Plane { point, normal } => {

@@ -5,6 +5,11 @@
 //! this substep is taken back by at most the coefficient of friction times the depth. The depth is what the normal
 //! force pushed the particle out by, so this is Coulomb's law.
 //!
+//! A particle that is inside already when a substep begins, because its body or the collider was put there, would get a
+//! speed of its depth over the substep. It keeps a part of that depth, as contacts between bodies do: it comes out at its
+//! depth over [`RECOVERY_TIME`]. What a substep adds to the depth is always taken back in full. VBD has substeps about as
+//! long as this time and puts particles out at once.
+//!
 //! Contacts are found where a particle is, not along its way: what crosses a collider within one substep passes, and
 //! what got past the middle of a thin box leaves on the other side. A substep must be short against thickness over
 //! speed.
@@ -23,8 +28,13 @@ use crate::particles::{PARALLEL_PARTICLES, Particles};
 use crate::substep::Substep;
 use crate::{Collider, Float, StepSettings};
 
+/// The time in s in which an existing depth decays by a factor of e: that of contacts by default.
+pub(crate) const RECOVERY_TIME: f64 = 0.02;
+
 /// How far a particle may be pushed, in depths.
 const LONGEST_PUSH: f64 = 10.0;
+/// Numbers of an obstacle for a device.
+const COLLIDER_NUMBERS: usize = 22;
 /// Largest number of times that a particle inside several colliders is pushed from one into another.
 const ROUNDS: usize = 32;
 
@@ -58,11 +68,18 @@ impl<R: Float> Clone for Colliders<R> {
 }
 
 impl<R: Float> Colliders<R> {
-    /// Places the colliders `elapsed` s after the start of the frame, at the end of a substep.
-    pub(crate) fn place(&mut self, settings: &StepSettings, elapsed: f64, origin: DVec3) {
+    /// Places the colliders `elapsed` s after the start of the frame, at the end of a substep, which then keep the part
+    /// `kept` of a depth that the substep begins with.
+    pub(crate) fn place(
+        &mut self,
+        settings: &StepSettings,
+        elapsed: f64,
+        origin: DVec3,
+        kept: f64,
+    ) {
         self.obstacles.clear();
         self.obstacles
-            .extend(Obstacle::place(settings, elapsed, origin));
+            .extend(Obstacle::place(settings, elapsed, origin, kept));
     }
 
     /// Whether a particle is inside of a collider or, but for rounding, on its surface.
@@ -131,7 +148,8 @@ impl<R: Float> Colliders<R> {
 
 impl<R: Float> ConstraintKind<R> for Colliders<R> {
     fn begin(&mut self, particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
-        self.place(substep.settings, substep.elapsed, particles.origin);
+        let kept = kept_depth(substep.settings);
+        self.place(substep.settings, substep.elapsed, particles.origin, kept);
         self.pushes.clear();
         if particles.keeps_refused() {
             self.pushes.resize(self.obstacles.len(), Force::default());
@@ -159,6 +177,15 @@ pub(crate) struct Obstacle<R: Float> {
     friction: R,
     /// What it moved in the substep.
     motion: R::Vector,
+    /// The part of a depth at the start of the substep that is left at its end.
+    kept: R,
+    /// A depth that is rounding of the shape's numbers.
+    slack: R,
+}
+
+/// The part of a depth that is left after a substep of XPBD.
+pub(crate) fn kept_depth(settings: &StepSettings) -> f64 {
+    1.0 - (settings.substep_time() / RECOVERY_TIME).min(1.0)
 }
 
 impl<R: Float> Obstacle<R> {
@@ -167,11 +194,17 @@ impl<R: Float> Obstacle<R> {
         settings: &StepSettings,
         elapsed: f64,
         origin: DVec3,
+        kept: f64,
     ) -> impl Iterator<Item = Self> {
-        let place = move |collider: &Collider| Self {
-            solid: Solid::new(&collider.moved(elapsed).shifted(-origin).shape),
-            friction: R::from_f64(collider.friction),
-            motion: R::from_dvec3(collider.velocity * settings.substep_time()),
+        let place = move |collider: &Collider| {
+            let solid = Solid::new(&collider.moved(elapsed).shifted(-origin).shape);
+            Self {
+                friction: R::from_f64(collider.friction),
+                motion: R::from_dvec3(collider.velocity * settings.substep_time()),
+                kept: R::from_f64(kept),
+                slack: solid.reach() * R::EPSILON * R::from_f64(8.0),
+                solid,
+            }
         };
         settings.colliders.iter().map(place)
     }
@@ -179,9 +212,7 @@ impl<R: Float> Obstacle<R> {
     /// The outward normal, if a particle is inside or, but for rounding, on the surface.
     pub(crate) fn touched_at(&self, x: R::Vector) -> Option<R::Vector> {
         let nearest = self.solid.nearest(x);
-        let [a, b, c] = R::components(x);
-        let size = (a * a + b * b + c * c).sqrt();
-        (nearest.distance <= size * R::EPSILON * R::from_f64(4.0)).then_some(nearest.normal)
+        (nearest.distance <= rounding::<R>(x)).then_some(nearest.normal)
     }
 
     /// What is left of a force in N on a particle that the collider bears: nothing of what presses the particle into
@@ -226,7 +257,28 @@ impl<R: Float> Obstacle<R> {
         if distance >= R::ZERO {
             return None;
         }
-        Some(self.rub(point, normal, -distance, x - previous))
+        let kept = self.kept_distance(previous);
+        if distance >= kept {
+            return None;
+        }
+        let (to, depth) = (point + normal * kept, kept - distance);
+        Some(self.rub(to, normal, depth, x - previous))
+    }
+
+    /// The distance from the surface, zero or negative, that a particle may keep which was at `previous` before the
+    /// substep. What lies on the surface is inside by no more than rounding, which is no depth.
+    #[inline]
+    fn kept_distance(&self, previous: R::Vector) -> R {
+        if self.kept <= R::ZERO {
+            return R::ZERO;
+        }
+        let before = previous + self.motion;
+        let distance = self.solid.nearest(before).distance;
+        if distance < -(self.slack + rounding::<R>(before)) {
+            self.kept * distance
+        } else {
+            R::ZERO
+        }
     }
 
     /// Where a particle at `x` is put that wants to move to `moved` inside: onto the plane that touches the surface
@@ -276,11 +328,21 @@ impl<R: Float> Obstacle<R> {
     }
 }
 
+/// How far a particle on a surface may be off it by rounding.
+#[inline]
+fn rounding<R: Float>(x: R::Vector) -> R {
+    let [a, b, c] = R::components(x);
+    let size = (a * a + b * b + c * c).sqrt();
+    size * R::EPSILON * R::from_f64(4.0)
+}
+
 impl Obstacle<f32> {
     /// The numbers of the obstacle, in the order of `Solver::collider_data`.
-    pub(crate) fn numbers(&self) -> [f32; 20] {
-        let mut numbers = self.solid.numbers();
+    pub(crate) fn numbers(&self) -> [f32; COLLIDER_NUMBERS] {
+        let mut numbers = [0.0; COLLIDER_NUMBERS];
+        numbers[..20].copy_from_slice(&self.solid.numbers());
         numbers[1] = self.friction;
+        [numbers[20], numbers[21]] = [self.kept, self.slack];
         numbers[4..7].copy_from_slice(&self.motion.to_array());
         numbers
     }

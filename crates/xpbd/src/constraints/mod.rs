@@ -20,7 +20,7 @@ pub use attachments::AttachmentData;
 pub(crate) use attachments::Attachments;
 pub(crate) use blades::Blades;
 pub use blades::{EdgePoint, SolidBlade};
-pub(crate) use colliders::{Colliders, Obstacle, outside};
+pub(crate) use colliders::{Colliders, Obstacle, kept_depth, outside};
 pub(crate) use contacts::Contacts;
 pub use contacts::{
     ContactData, ContactFactors, ContactLaw, ContactRound, ContactState, EdgeContact, FaceContact,

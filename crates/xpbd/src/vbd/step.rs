@@ -199,7 +199,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             ..
         } = &mut solver.constraints;
         let lost = attachments.move_rigid_attachments(&solver.particles, ended);
-        colliders.place(&own, ended * own.time_step, solver.particles.origin);
+        colliders.place(&own, ended * own.time_step, solver.particles.origin, 0.0);
         stars.begin(solver, implicit_time, penalty);
         let mut step = Self {
             solver,

@@ -232,9 +232,10 @@ fn points_without_a_nearest_one_have_a_normal_all_the_same() {
 
 fn pushed_out<R: Real>(collider: Collider, x: DVec3, tolerance: f64) {
     let mut solver = dust::<R>(&[x]);
+    // As long as the time in which a depth decays: all of it is taken back at once.
     let settings = StepSettings {
         colliders: vec![collider],
-        ..StepSettings::new(0.01)
+        ..StepSettings::new(0.02)
     };
     step(&mut solver, &settings);
     within(
@@ -574,4 +575,38 @@ proptest! {
             prop_assert!(solver.position(p).is_finite() && solver.velocity(p).is_finite());
         }
     }
+}
+
+/// A particle that is inside from the start comes out at its depth over 20 ms, whatever the substep, and goes on at that
+/// speed; what a moving collider adds to the depth is taken back in full.
+fn comes_out_slowly<R: Real>(tolerance: f64) {
+    const DEPTH: f64 = 0.04;
+    let [point, normal] = [dvec3(0.3, 0.1, 0.2), dvec3(1.0, 2.0, 2.0) / 3.0];
+    for (speed, substeps) in [(0.0, 1), (0.0, 20), (0.5, 5), (0.5, 20)] {
+        let shape = ColliderShape::Plane { point, normal };
+        let mut collider = Collider {
+            velocity: normal * speed,
+            ..Collider::new(shape)
+        };
+        let mut solver = dust::<R>(&[point - normal * DEPTH]);
+        for frame in 1..=6 {
+            let settings = StepSettings {
+                substeps,
+                colliders: vec![collider],
+                ..StepSettings::new(0.01)
+            };
+            step(&mut solver, &settings);
+            collider = collider.moved(0.01);
+            let time = 0.01 * f64::from(frame);
+            let (distance, _) = collider.distance(solver.position(0));
+            let expected = DEPTH * (time / 0.02 - 1.0);
+            within("distance", (distance - expected).abs(), tolerance);
+        }
+    }
+}
+
+#[test]
+fn particles_inside_from_the_start_come_out_slowly() {
+    comes_out_slowly::<f64>(1e-14);
+    comes_out_slowly::<f32>(1e-6);
 }
