@@ -223,7 +223,7 @@ fn colliders_at_rest_are_sent_once() {
     assert_eq!(still.dispatches, 4 * substep);
     settings.colliders[0].velocity = DVec3::Z * 0.1;
     let moving = spent(&mut device, &settings);
-    assert_eq!(moving.uploaded_bytes, 4 * 2 * 80);
+    assert_eq!(moving.uploaded_bytes, 4 * 2 * 88);
     // Without colliders there is no trace of them.
     settings.colliders.clear();
     let without = spent(&mut device, &settings);
