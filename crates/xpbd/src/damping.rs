@@ -17,6 +17,7 @@ use fearless_simd::Level;
 use crate::Float;
 use crate::gauss_seidel;
 use crate::layout::Layout;
+use crate::pace::Pace;
 use crate::particles::Particles;
 use crate::simd_kernel::Pass;
 use crate::substep::Factors;
@@ -26,11 +27,15 @@ use crate::substep::Factors;
 pub(crate) struct Damping<R: Float> {
     /// Copies of velocities and inverse masses that threads may share, while some material is damped.
     cells: Vec<R::Particle>,
+    pace: Pace,
 }
 
 impl<R: Float> Default for Damping<R> {
     fn default() -> Self {
-        Self { cells: Vec::new() }
+        Self {
+            cells: Vec::new(),
+            pace: Pace::default(),
+        }
     }
 }
 
@@ -52,15 +57,14 @@ impl<R: Float> Damping<R> {
         }));
         let pass = Pass {
             layout,
-            particles: &particles.cells,
-            velocities: &self.cells,
+            positions: &particles.cells,
             multipliers: &[],
             corrections: &[],
             refused: &particles.refused,
             iterated: false,
             factors,
         };
-        gauss_seidel::damp(level, &pass);
+        gauss_seidel::damp(level, &pass, &mut self.cells, &mut self.pace);
         for (velocity, cell) in particles.velocities.iter_mut().zip(&self.cells) {
             let [x, y, z, _] = R::read(cell);
             *velocity = R::vector(x, y, z);

@@ -9,8 +9,10 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use fearless_simd::{Simd, SimdFloat, SimdFloatElement};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
+
+use crate::transpose;
 
 /// Types that can be serialized, with the feature `serde`; all types without it.
 #[cfg(feature = "serde")]
@@ -96,8 +98,22 @@ pub trait Float:
     fn particle(values: [Self; 4]) -> Self::Particle;
     /// The values in a particle's cell.
     fn read(particle: &Self::Particle) -> [Self; 4];
+    /// The values in a particle's cell that no other thread sees: one move in place of several.
+    fn read_alone(particle: &mut Self::Particle) -> [Self; 4];
+    /// Puts values into a particle's cell that no other thread sees.
+    fn write_alone(particle: &mut Self::Particle, values: [Self; 4]);
     /// Puts values into a particle's cell.
     fn write(particle: &Self::Particle, values: [Self; 4]);
+
+    /// The place of a lane's particle in four vectors of consecutive particles that [`Float::columns`] takes.
+    #[doc(hidden)]
+    fn row<S: Simd>(lane: usize) -> usize;
+    /// Four vectors of particles as vectors of x, y, z and inverse masses.
+    #[doc(hidden)]
+    fn columns<S: Simd>(simd: S, rows: [Self::Lanes<S>; 4]) -> [Self::Lanes<S>; 4];
+    /// The inverse of [`Float::columns`].
+    #[doc(hidden)]
+    fn rows<S: Simd>(simd: S, columns: [Self::Lanes<S>; 4]) -> [Self::Lanes<S>; 4];
 
     /// Rounds a vector of doubles to this precision.
     #[inline]
@@ -117,7 +133,7 @@ pub trait Float:
 }
 
 macro_rules! float {
-    ($scalar:ty, $vector:ty, $atomic:ty, $lanes:ident, $from_f64:expr, $cells:literal, $pack:expr, $unpack:expr) => {
+    ($scalar:ty, $vector:ty, $atomic:ty, $lanes:ident, $from_f64:expr, $cells:literal, $pack:expr, $unpack:expr, $row:path, $columns:path, $rows:path) => {
         impl Float for $scalar {
             type Vector = $vector;
             type Atomic = $atomic;
@@ -188,6 +204,26 @@ macro_rules! float {
                     cell.store(bits, Ordering::Relaxed);
                 }
             }
+            #[inline(always)]
+            fn read_alone(particle: &mut Self::Particle) -> [Self; 4] {
+                $unpack(particle.each_mut().map(|cell| *cell.get_mut()))
+            }
+            #[inline(always)]
+            fn write_alone(particle: &mut Self::Particle, values: [Self; 4]) {
+                *particle = $pack(values).map(AtomicU64::new);
+            }
+            #[inline(always)]
+            fn row<S: Simd>(lane: usize) -> usize {
+                $row(lane, Self::Lanes::<S>::LEN)
+            }
+            #[inline(always)]
+            fn columns<S: Simd>(simd: S, rows: [Self::Lanes<S>; 4]) -> [Self::Lanes<S>; 4] {
+                $columns(simd, rows)
+            }
+            #[inline(always)]
+            fn rows<S: Simd>(simd: S, columns: [Self::Lanes<S>; 4]) -> [Self::Lanes<S>; 4] {
+                $rows(simd, columns)
+            }
         }
     };
 }
@@ -236,7 +272,10 @@ float!(
     round_to_f32,
     2,
     pack_f32,
-    unpack_f32
+    unpack_f32,
+    transpose::row_f32,
+    transpose::within_blocks,
+    transpose::within_blocks
 );
 float!(
     f64,
@@ -246,7 +285,10 @@ float!(
     std::convert::identity,
     4,
     pack_f64,
-    unpack_f64
+    unpack_f64,
+    transpose::row_f64,
+    transpose::deinterleave,
+    transpose::interleave
 );
 
 /// Whether all components are finite.

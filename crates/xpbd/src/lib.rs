@@ -57,6 +57,7 @@ mod layout;
 mod material;
 mod measure;
 mod neo_hookean;
+mod pace;
 mod particles;
 mod pose;
 mod real;
@@ -68,6 +69,7 @@ mod stepper;
 mod substep;
 mod team;
 mod tets;
+mod transpose;
 mod vbd;
 mod wide;
 

@@ -35,7 +35,7 @@
 //! solve), paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used
 //! here). The split is derived in `docs/solver.md`. Cost: about 420 operations and three divisions a tet (split), 330,
 //! one square root and two divisions (block); in single precision 80 bytes of the layout and four corners of 16 bytes,
-//! read and written. Moving corners between memory and lanes is more than half of the instructions.
+//! read and written. Moving corners between memory and lanes is about half of the instructions.
 
 mod memory;
 
@@ -46,15 +46,17 @@ use crate::neo_hookean::{LARGE_STRAIN, MAX_COFACTOR_NORM, SHORTENINGS};
 use crate::particles::add_to;
 use crate::substep::Factors;
 use crate::{Float, TetSolve};
-use memory::{gather, load_multipliers, scatter, splat, store_multipliers};
+pub(crate) use memory::{Access, Alone, Buffers, Shared, buffers};
+use memory::{
+    gather, gathered, load_multipliers, put, shift, splat, store_multipliers, write_corners,
+};
 
 /// The input of a pass over the tets.
 #[derive(Debug)]
 pub(crate) struct Pass<'a, R: Float> {
     pub(crate) layout: &'a Layout<R>,
-    pub(crate) particles: &'a [R::Particle],
-    /// Velocities and inverse masses of the particles; used by [`Damping`] only, else empty.
-    pub(crate) velocities: &'a [R::Particle],
+    /// Of [`Damping`] only, else empty: the particles, of which the pass changes velocities.
+    pub(crate) positions: &'a [R::Particle],
     /// Block, number, lane: the multipliers; empty if not kept.
     pub(crate) multipliers: &'a [R::Atomic],
     /// Sums of the corrections of a Jacobi pass, which leaves the particles unchanged; else empty.
@@ -66,15 +68,34 @@ pub(crate) struct Pass<'a, R: Float> {
     pub(crate) factors: Factors<R>,
 }
 
+impl<R: Float> Pass<'_, R> {
+    /// Whether particles alone are written, in a single iteration.
+    pub(crate) fn is_plain(&self) -> bool {
+        !self.iterated
+            && self.multipliers.is_empty()
+            && self.corrections.is_empty()
+            && self.refused.is_empty()
+    }
+}
+
 /// A kernel over a block of tets. Each implementation is compiled on its own; whether multipliers are kept and where
 /// corrections go is decided once a block at run time, which costs nothing measurable.
 pub(crate) trait BlockKernel {
     /// Processes the tets of a block, which share no particle.
-    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize);
+    fn run<R: Float, S: Simd>(
+        simd: S,
+        pass: &Pass<'_, R>,
+        particles: &mut impl Access<R>,
+        buffers: &mut Buffers<R>,
+        block: usize,
+    );
 }
 
 /// [`TetSolve::Split`].
 pub(crate) struct Split;
+/// [`TetSolve::Split`] in a single iteration of Gauss-Seidel that keeps neither multipliers nor what held particles are
+/// refused. Without these choices fewer registers are spilled.
+pub(crate) struct PlainSplit;
 /// [`TetSolve::Block`].
 pub(crate) struct Block;
 /// [`TetSolve::Sequential`].
@@ -84,29 +105,75 @@ pub(crate) struct Damping;
 
 impl BlockKernel for Split {
     #[inline(always)]
-    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
-        solve_block::<R, S>(simd, pass, block, TetSolve::Split);
+    fn run<R: Float, S: Simd>(
+        simd: S,
+        pass: &Pass<'_, R>,
+        particles: &mut impl Access<R>,
+        buffers: &mut Buffers<R>,
+        block: usize,
+    ) {
+        solve_block::<R, S>(simd, pass, particles, buffers, block, TetSolve::Split);
+    }
+}
+
+impl BlockKernel for PlainSplit {
+    #[inline(always)]
+    fn run<R: Float, S: Simd>(
+        simd: S,
+        pass: &Pass<'_, R>,
+        particles: &mut impl Access<R>,
+        buffers: &mut Buffers<R>,
+        block: usize,
+    ) {
+        let lanes = R::Lanes::<S>::LEN;
+        let blocks = &pass.layout.blocks;
+        let active = blocks.active[block];
+        let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
+        let tets = Tets::<R, S>::new(simd, pass, block);
+        let x = gather::<R, S>(simd, particles, corners, buffers);
+        let change = tets.split(&x, &tets.gradients(), buffers, None);
+        let changes = corner_changes::<R, S>(&x, &change, &tets.again().gradients());
+        shift::<R, S>(simd, &changes, buffers);
+        particles.write::<S>(corners, active, buffers);
     }
 }
 
 impl BlockKernel for Block {
     #[inline(always)]
-    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
-        solve_block::<R, S>(simd, pass, block, TetSolve::Block);
+    fn run<R: Float, S: Simd>(
+        simd: S,
+        pass: &Pass<'_, R>,
+        particles: &mut impl Access<R>,
+        buffers: &mut Buffers<R>,
+        block: usize,
+    ) {
+        solve_block::<R, S>(simd, pass, particles, buffers, block, TetSolve::Block);
     }
 }
 
 impl BlockKernel for Sequential {
     #[inline(always)]
-    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
-        solve_block::<R, S>(simd, pass, block, TetSolve::Sequential);
+    fn run<R: Float, S: Simd>(
+        simd: S,
+        pass: &Pass<'_, R>,
+        particles: &mut impl Access<R>,
+        buffers: &mut Buffers<R>,
+        block: usize,
+    ) {
+        solve_block::<R, S>(simd, pass, particles, buffers, block, TetSolve::Sequential);
     }
 }
 
 impl BlockKernel for Damping {
     #[inline(always)]
-    fn run<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
-        damp_block::<R, S>(simd, pass, block);
+    fn run<R: Float, S: Simd>(
+        simd: S,
+        pass: &Pass<'_, R>,
+        particles: &mut impl Access<R>,
+        buffers: &mut Buffers<R>,
+        block: usize,
+    ) {
+        damp_block::<R, S>(simd, pass, particles, buffers, block);
     }
 }
 
@@ -140,12 +207,6 @@ struct Energies<V, M> {
 type EnergiesOf<R, S> =
     Energies<<R as Float>::Lanes<S>, <<R as Float>::Lanes<S> as SimdBase<S>>::Mask>;
 
-/// The corners of tets with their inverse masses, and a change of them per weight.
-struct Step<R: Float, S: Simd> {
-    x: [[R::Lanes<S>; 4]; 4],
-    change: Matrix<R::Lanes<S>>,
-}
-
 /// What [`move_corners`] is called with, without positions.
 struct Offer<R: Float, S: Simd> {
     weights: [R::Lanes<S>; 4],
@@ -168,13 +229,19 @@ struct Tets<'a, R: Float, S: Simd> {
 
 /// Solves the constraints of the tets of a block.
 #[inline(always)]
-fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, form: TetSolve) {
+fn solve_block<R: Float, S: Simd>(
+    simd: S,
+    pass: &Pass<'_, R>,
+    particles: &mut impl Access<R>,
+    buffers: &mut Buffers<R>,
+    block: usize,
+    form: TetSolve,
+) {
     let lanes = R::Lanes::<S>::LEN;
     let blocks = &pass.layout.blocks;
     let active = blocks.active[block];
     let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
-    let read = |p: u32| R::read(&pass.particles[p as usize]);
-    let mut x = gather::<R, S>(simd, corners, read);
+    let mut x = gather::<R, S>(simd, particles, corners, buffers);
     let tets = Tets::<R, S>::new(simd, pass, block);
     let q = tets.gradients();
     let f = deformation::<R, S>(&x, &q);
@@ -191,7 +258,7 @@ fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, for
             let change = if pass.iterated {
                 tets.split_iterated(&f, &mut multipliers)
             } else {
-                tets.split(&x, &q, keeps, &mut multipliers)
+                tets.split(&x, &q, buffers, keeps.then_some(&mut multipliers))
             };
             move_corners::<R, S>(&mut x, &change, &q);
             refuse::<R, S>(pass, block, &x, &change, &q);
@@ -224,27 +291,35 @@ fn solve_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize, for
                 x[k][axis] -= before[k][axis];
             }
         }
+    }
+    put::<R, S>(simd, &x, buffers);
+    if jacobi {
         let add = |p: u32, [x, y, z, _]: [R; 4]| {
             let sum = &pass.corrections[p as usize];
             let [a, b, c, d] = R::read(sum);
             R::write(sum, [a + x, b + y, c + z, d]);
         };
-        scatter::<R, S>(&x, corners, active, add);
+        write_corners::<R, S>(corners, active, buffers, add);
     } else {
-        let write = |p: u32, values| R::write(&pass.particles[p as usize], values);
-        scatter::<R, S>(&x, corners, active, write);
+        particles.write::<S>(corners, active, buffers);
     }
 }
 
 /// Damps the velocities of the corners of the tets of a block.
 #[inline(always)]
-fn damp_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
+fn damp_block<R: Float, S: Simd>(
+    simd: S,
+    pass: &Pass<'_, R>,
+    velocities: &mut impl Access<R>,
+    buffers: &mut Buffers<R>,
+    block: usize,
+) {
     let lanes = R::Lanes::<S>::LEN;
     let blocks = &pass.layout.blocks;
     let active = blocks.active[block];
     let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
-    let x = gather::<R, S>(simd, corners, |p| R::read(&pass.particles[p as usize]));
-    let mut v = gather::<R, S>(simd, corners, |p| R::read(&pass.velocities[p as usize]));
+    let x = gather::<R, S>(simd, &mut Shared(pass.positions), corners, buffers);
+    let mut v = gather::<R, S>(simd, velocities, corners, buffers);
     let tets = Tets::<R, S>::new(simd, pass, block);
     let q = tets.gradients();
     let f = deformation::<R, S>(&x, &q);
@@ -254,8 +329,8 @@ fn damp_block<R: Float, S: Simd>(simd: S, pass: &Pass<'_, R>, block: usize) {
     let change = tets.damped_shear(&f, &deformation::<R, S>(&v, &q));
     move_corners::<R, S>(&mut v, &change, &q);
     refuse::<R, S>(pass, block, &v, &change, &q);
-    let write = |p: u32, values| R::write(&pass.velocities[p as usize], values);
-    scatter::<R, S>(&v, corners, active, write);
+    put::<R, S>(simd, &v, buffers);
+    velocities.write::<S>(corners, active, buffers);
 }
 
 impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
@@ -282,6 +357,15 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
             damping: damping * splat::<R, S>(simd, pass.factors.per_time),
             time_squared: splat::<R, S>(simd, pass.factors.time_squared),
             relaxation: splat::<R, S>(simd, pass.factors.relaxation),
+        }
+    }
+
+    /// These tets, of which what is read comes from memory again in place of a register that was spilled.
+    #[inline(always)]
+    fn again(&self) -> Self {
+        Self {
+            rest: std::hint::black_box(self.rest),
+            ..*self
         }
     }
 
@@ -445,19 +529,23 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
     /// that of the minimum of the parabola through the energy and its slope before the step and the energy after it,
     /// and so on up to [`SHORTENINGS`] times while the energy still rises.
     ///
-    /// Compiled once and called with copies, so that the loop over tets near rest keeps its registers.
+    /// Compiled once and called with copies, so that the loop over tets near rest keeps its registers. The corners are
+    /// those last gathered into the buffers.
     #[cold]
     #[inline(never)]
-    fn descent(&self, step: &Step<R, S>) -> R::Lanes<S> {
+    fn descent(&self, buffers: &Buffers<R>, change: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
         self.simd.vectorize(
             #[inline(always)]
-            || self.descent_in_lanes(step),
+            || self.descent_in_lanes(&gathered(self.simd, buffers), change),
         )
     }
 
     #[inline(always)]
-    fn descent_in_lanes(&self, step: &Step<R, S>) -> R::Lanes<S> {
-        let Step { x, change } = step;
+    fn descent_in_lanes(
+        &self,
+        x: &[[R::Lanes<S>; 4]; 4],
+        change: &Matrix<R::Lanes<S>>,
+    ) -> R::Lanes<S> {
         let (one, zero) = (self.splat(R::ONE), self.splat(R::ZERO));
         let half = self.splat(R::HALF);
         let lame = self.ratio - one;
@@ -548,15 +636,15 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         (six + r) / (six + r * (four + r))
     }
 
-    /// The change of the corners per weight by the split form in a single iteration. `keeps` asks for multipliers,
-    /// which are those of this iteration.
+    /// The change of the corners per weight by the split form in a single iteration, and the multipliers of this
+    /// iteration if there is a place for them.
     #[inline(always)]
     fn split(
         &self,
         x: &[[R::Lanes<S>; 4]; 4],
         q: &Matrix<R::Lanes<S>>,
-        keeps: bool,
-        multipliers: &mut [R::Lanes<S>; 2],
+        buffers: &Buffers<R>,
+        multipliers: Option<&mut [R::Lanes<S>; 2]>,
     ) -> Matrix<R::Lanes<S>> {
         let zero = self.splat(R::ZERO);
         let f = &deformation::<R, S>(x, q);
@@ -567,19 +655,29 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         let part = self.decay(steepness / twice);
         let part = energies.shear.simd_gt(zero).select(part, zero);
         let along = -(self.stiffness() * part);
-        if keeps {
-            let root = twice.max(zero).sqrt();
-            let multiplier = along * root * self.relaxation;
-            multipliers[0] += multiplier.is_finite().select(multiplier, zero);
-        }
-        let mut change = self.split_change(&energies, &factored, along, false, &mut multipliers[1]);
+        let mut volume = multipliers
+            .as_ref()
+            .map_or(zero, |multipliers| multipliers[1]);
+        let mut change = self.split_change(&energies, &factored, along, false, &mut volume);
+        let mut part = None;
         if energies.far.any_true() {
-            let part = self.descent(&Step { x: *x, change });
+            // Copies, so that only this branch needs them in memory.
+            let (tets, whole) = (Self { ..*self }, change);
+            let taken = tets.descent(buffers, &whole);
             for entry in change.as_flattened_mut() {
-                *entry *= part;
+                *entry *= taken;
             }
-            for multiplier in multipliers {
-                *multiplier *= part;
+            part = Some(taken);
+        }
+        if let Some(multipliers) = multipliers {
+            let root = twice.max(zero).sqrt();
+            let shear = along * root * self.relaxation;
+            multipliers[0] += shear.is_finite().select(shear, zero);
+            multipliers[1] = volume;
+            if let Some(part) = part {
+                for multiplier in multipliers {
+                    *multiplier *= part;
+                }
             }
         }
         change
@@ -805,6 +903,27 @@ fn move_corners<R: Float, S: Simd>(
         x[2][axis] += x[2][3] * b;
         x[3][axis] += x[3][3] * c;
     }
+}
+
+/// What [`move_corners`] moves each corner by.
+#[inline(always)]
+fn corner_changes<R: Float, S: Simd>(
+    x: &[[R::Lanes<S>; 4]; 4],
+    change: &Matrix<R::Lanes<S>>,
+    q: &Matrix<R::Lanes<S>>,
+) -> [[R::Lanes<S>; 3]; 4] {
+    let mut changes = [q[0], q[0], q[1], q[2]];
+    for axis in 0..3 {
+        let row = [change[0][axis], change[1][axis], change[2][axis]];
+        let a = dot::<R, S>(&row, &q[0]);
+        let b = dot::<R, S>(&row, &q[1]);
+        let c = dot::<R, S>(&row, &q[2]);
+        changes[0][axis] = -(x[0][3] * (a + b + c));
+        changes[1][axis] = x[1][3] * a;
+        changes[2][axis] = x[2][3] * b;
+        changes[3][axis] = x[3][3] * c;
+    }
+    changes
 }
 
 /// Keeps what [`move_corners`] does not move the corners of inverse mass 0 by, if that is asked for.

@@ -18,6 +18,7 @@ use crate::forces::ForceMeter;
 use crate::gauss_seidel;
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
+use crate::pace::Pace;
 use crate::particles::Particles;
 use crate::simd_kernel::Pass;
 use crate::substep::Substep;
@@ -73,6 +74,9 @@ pub(crate) struct Stepper<R: Float> {
     multipliers: Vec<R::Atomic>,
     #[cfg_attr(feature = "serde", serde(skip))]
     jacobi: Option<Jacobi<R>>,
+    /// Whether threads pay, as passes have shown so far.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pace: Pace,
     #[cfg_attr(feature = "serde", serde(skip))]
     damping: Damping<R>,
     pub(crate) last: LastSubstep<R>,
@@ -87,6 +91,7 @@ impl<R: Float> Default for Stepper<R> {
             level: Level::new(),
             multipliers: Vec::new(),
             jacobi: None,
+            pace: Pace::default(),
             damping: Damping::default(),
             last: LastSubstep {
                 predicted: Vec::new(),
@@ -209,11 +214,17 @@ impl<R: Float> Stepper<R> {
     }
 
     /// One iteration over the tets.
-    fn iterate(&mut self, particles: &Particles<R>, layout: &Layout<R>, substep: &Substep<'_, R>) {
+    fn iterate(
+        &mut self,
+        particles: &mut Particles<R>,
+        layout: &Layout<R>,
+        substep: &Substep<'_, R>,
+    ) {
         let Self {
             level,
             multipliers,
             jacobi,
+            pace,
             ..
         } = self;
         let settings = substep.settings;
@@ -223,15 +234,20 @@ impl<R: Float> Stepper<R> {
         }
         let pass = Pass {
             layout,
-            particles: &particles.cells,
-            velocities: &[],
+            positions: &[],
             multipliers,
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
             refused: &particles.refused,
             iterated: settings.iterations > 1,
             factors: substep.factors,
         };
-        gauss_seidel::solve(*level, settings.tet_solve, &pass);
+        gauss_seidel::solve(
+            *level,
+            settings.tet_solve,
+            &pass,
+            &mut particles.cells,
+            pace,
+        );
         let Some(jacobi) = jacobi else { return };
         jacobi.apply(&particles.cells);
         if let Method::Chebyshev {

@@ -2,14 +2,17 @@
 //!
 //! A color takes about as long as waking a thread. Helpers are therefore woken once for all colors and meet at a
 //! counter after each. A free thread takes the next chunk of the round. Helpers that have not started are not waited
-//! for: if the pool is busy elsewhere, the caller does all chunks. A thread without a chunk spins briefly and then
-//! parks, since on a busy machine the thread it waits for may need its core.
+//! for: if the pool is busy elsewhere, the caller does all chunks. A thread without a chunk spins for a moment,
+//! then yields and at last parks, since the thread it waits for may need its core: on a busy machine, or where a helper
+//! was woken on the core of the caller.
 
 use std::sync::atomic::{AtomicU32, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// Looks at the counter before a waiting thread parks: a few microseconds.
-const LOOKS: u32 = 2_000;
+/// Looks at the counter before a waiting thread lets others have its core: about a microsecond.
+const LOOKS: u32 = 100;
+/// Times that a waiting thread lets others have its core before it parks: some tens of microseconds if none wants it.
+const YIELDS: u32 = 50;
 
 /// Calls `work(round, chunk)` for all chunks of all rounds, `chunks(round)` of them in each, on the threads of the
 /// present rayon pool. A round begins when the one before it has ended; what its chunks wrote is visible then.
@@ -121,6 +124,13 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Team<'_, C, W> {
                 return now;
             }
             std::hint::spin_loop();
+        }
+        for _ in 0..YIELDS {
+            std::thread::yield_now();
+            let now = self.next.load(Ordering::Acquire);
+            if now >> 32 != round {
+                return now;
+            }
         }
         self.parked.fetch_add(1, Ordering::SeqCst);
         let mut guard = self.lock.lock().unwrap_or_else(PoisonError::into_inner);
