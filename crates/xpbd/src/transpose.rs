@@ -1,8 +1,8 @@
 //! Transposition of particles in vectors: from x, y, z and inverse mass side by side to a vector of each, and back.
 //!
 //! In single precision a particle is a block of 128 bits. With the particles of lanes 0, 4, 8 and 12 in the first vector,
-//! 1, 5, 9 and 13 in the second and so on, no number has to leave its block, and two rounds of unpacking do it. No other
-//! order of shuffles is as short on processors with more than one block in a vector.
+//! 1, 5, 9 and 13 in the second and so on, no number leaves its block, and two rounds of unpacking are enough. Unlike
+//! permutations across blocks they need no index vectors and overwrite no operand.
 
 use fearless_simd::{Simd, SimdBase};
 
