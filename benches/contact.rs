@@ -28,6 +28,7 @@ fn main() {
             pieces: &pieces,
             positions: &positions,
             velocities: &vec![DVec3::ZERO; positions.len()],
+            fixed: &[],
             frame_time: 1.0 / 60.0,
         });
         let delta = cut_plane(&mut body, &positions, &plane, &CutOptions::default()).unwrap();
@@ -51,6 +52,7 @@ fn measure(
             pieces,
             positions,
             velocities: &velocities,
+            fixed: &[],
             frame_time: 1.0 / 60.0,
         })
     };

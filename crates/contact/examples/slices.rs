@@ -53,6 +53,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             pieces: &pieces,
             positions: &positions,
             velocities: &velocities,
+            fixed: &[],
             frame_time: FRAME,
         });
         println!(

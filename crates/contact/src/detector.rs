@@ -5,6 +5,10 @@
 //! no search, are evaluated each frame. The solver takes the plain records and decides in each substep which of them
 //! act.
 //!
+//! Of the candidates, those are listed that the frame may bring together. How far to look ahead is known by vertex: the
+//! motion of a part as a whole towards others, and what the vertex moves beside it. So a fast corner of a sliver looks
+//! far, and what rests beside it does not. What none of the particles involved can change is not listed unless it overlaps.
+//!
 //! What is near is known by parts: the pieces of all bodies. Two parts whose boxes are out of reach of each other do not
 //! matter to each other, however fast they part or pass, and a part that turns as a whole does not approach itself.
 //!
@@ -12,7 +16,7 @@
 //! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
 //! distance and face.
 //!
-//! Cost: an update without a search is two passes over the surface vertices, and one over the candidates and the twins; a
+//! Cost: an update without a search is three passes over the surface vertices, and one over the candidates and the twins; a
 //! search is a refit of the trees and a query for each surface vertex and each feature edge, on all threads; a delta costs what the boundary lost and
 //! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
 //! cut builds a tree over the new triangles, and over all of them once these are more than a
@@ -49,6 +53,9 @@ const SLID_SKIN: f64 = 0.5;
 const DEEPER: f64 = 0.25;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
 const BEYOND: f64 = 0.25;
+/// Candidates are listed that are apart by this fraction of the skin more than the frame may bring them together: what
+/// speeds up within the frame may come further.
+const SPARE: f64 = 0.5;
 
 /// What an update changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -100,6 +107,7 @@ struct Sighting {
 ///     pieces: &pieces,
 ///     positions: &positions,
 ///     velocities: &velocities,
+///     fixed: &[],
 ///     frame_time: 1.0 / 60.0,
 /// };
 /// contacts.update(&state);
@@ -126,12 +134,16 @@ pub struct ContactDetector {
     /// Slots that the main tree was built over.
     main_slots: usize,
     pairs: Vec<PairContact>,
-    faces: Vec<FaceContact>,
+    /// All that the last search found, and where.
+    face_candidates: Vec<FaceContact>,
     sightings: Vec<Sighting>,
+    edge_candidates: Vec<EdgeContact>,
+    /// Those that the frame may bring together.
+    faces: Vec<FaceContact>,
+    edges: Vec<EdgeContact>,
     features: FeatureEdges,
     /// Whether the surface has changed since they were listed.
     features_are_due: bool,
-    edges: Vec<EdgeContact>,
     /// The vertices inside another part, ascending, each with the tet that contains it.
     inside: Vec<(ParticleId, TetId)>,
     deep: usize,
@@ -164,6 +176,8 @@ struct Room {
     last_edges: Vec<EdgeContact>,
     last_pairs: Vec<PairContact>,
     last_inside: Vec<(ParticleId, TetId)>,
+    /// By particle.
+    ahead: Vec<Ahead>,
     /// By piece.
     parts: Vec<Part>,
     /// The pieces in the order of their boxes along x.
@@ -194,11 +208,13 @@ impl ContactDetector {
             fresh_is_due: false,
             main_slots: 0,
             pairs: Vec::new(),
-            faces: Vec::new(),
+            face_candidates: Vec::new(),
             sightings: Vec::new(),
+            edge_candidates: Vec::new(),
+            faces: Vec::new(),
+            edges: Vec::new(),
             features: FeatureEdges::default(),
             features_are_due: true,
-            edges: Vec::new(),
             inside: Vec::new(),
             deep: 0,
             buried: 0,
@@ -241,11 +257,13 @@ impl ContactDetector {
         self.search_is_due = true;
         self.location_is_due = true;
         self.inside.clear();
-        self.faces.clear();
+        self.face_candidates.clear();
         self.sightings.clear();
+        self.edge_candidates.clear();
+        self.faces.clear();
+        self.edges.clear();
         self.features.clear();
         self.features_are_due = true;
-        self.edges.clear();
         self.pairs.clear();
     }
 
@@ -351,10 +369,13 @@ impl ContactDetector {
         let skin = self.settings.skin * self.mean_edge;
         let reach = skin + moved.margin + self.settings.thickness;
 
+        let near = self.near(state);
         std::mem::swap(&mut self.pairs, &mut self.room.last_pairs);
+        let ahead = &self.room.ahead;
+        let is_near = |[a, b]: [u32; 2], gap: f64| near.of(ahead, &[a], &[b], gap);
         let evaluated =
             self.fresh_pairs
-                .evaluate(&self.surface, state.positions, reach, &mut self.pairs);
+                .evaluate(&self.surface, state.positions, is_near, &mut self.pairs);
         let searched = self.search_is_due
             || evaluated.retired
             || moved.needed > self.reach
@@ -367,18 +388,50 @@ impl ContactDetector {
         if searched {
             self.reach = reach;
             self.search(state);
-            let Room {
-                last_faces,
-                last_edges,
-                ..
-            } = &self.room;
-            update.faces_changed = differ(&self.faces, last_faces, |c| c.particles);
-            update.edges_changed = differ(&self.edges, last_edges, |c| c.particles);
         } else {
-            turn(&mut self.edges, state.positions);
+            turn(&mut self.edge_candidates, state.positions);
         }
+        self.list(state);
+        update.faces_changed = differ(&self.faces, &self.room.last_faces, |c| c.particles);
+        update.edges_changed = differ(&self.edges, &self.room.last_edges, |c| c.particles);
         update.pairs_changed = differ(&self.pairs, &self.room.last_pairs, |c| c.particles);
         update
+    }
+
+    /// What decides which contacts are near.
+    fn near<'s>(&self, state: &ContactState<'s>) -> Near<'s> {
+        let skin = self.settings.skin * self.mean_edge;
+        Near {
+            fixed: state.fixed,
+            spare: SPARE * skin + self.settings.thickness,
+            limit: self.settings.reach * self.mean_edge,
+        }
+    }
+
+    /// Lists the candidates that the frame may bring together.
+    fn list(&mut self, state: &ContactState<'_>) {
+        let near = self.near(state);
+        let Room {
+            ahead,
+            last_faces,
+            last_edges,
+            ..
+        } = &mut self.room;
+        std::mem::swap(&mut self.faces, last_faces);
+        std::mem::swap(&mut self.edges, last_edges);
+        self.faces.clear();
+        self.edges.clear();
+        let faces = self.face_candidates.iter().filter(|contact| {
+            let [vertex, corners @ ..] = &contact.particles;
+            let gap = contact.gap(state.positions);
+            near.of(ahead, std::slice::from_ref(vertex), corners, gap)
+        });
+        self.faces.extend(faces);
+        let edges = self.edge_candidates.iter().filter(|contact| {
+            let (one, other) = contact.particles.split_at(2);
+            near.of(ahead, one, other, contact.separation(state.positions))
+        });
+        self.edges.extend(edges);
     }
 
     /// Into how many equal parts a frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
@@ -416,7 +469,12 @@ impl ContactDetector {
         let limit = self.settings.reach * self.mean_edge;
         let thickness = self.settings.thickness;
         let widest = (self.settings.skin * self.mean_edge + limit + thickness).max(self.reach);
-        let Room { parts, sorted, .. } = &mut self.room;
+        let Room {
+            parts,
+            sorted,
+            ahead,
+            ..
+        } = &mut self.room;
         let number = self.parts.iter().map(|&part| part as usize);
         let motions = self.vertices.iter().enumerate().map(|(i, &vertex)| {
             let x = state.positions[vertex as usize];
@@ -470,10 +528,22 @@ impl ContactDetector {
                     one.body == other.body || self.settings.bodies.allow(one.body, other.body);
                 if may_touch && around.overlaps(&other.bounds) {
                     meet(one.towards(other, widest), other.turned());
-                    other.is_near = true;
-                    parts[sorted[i] as usize].is_near = true;
+                    let approach = one.approach(other, widest);
+                    other.meet(approach);
+                    parts[sorted[i] as usize].meet(approach);
                 }
             }
+        }
+        let most = |way: f64| if way <= limit { way } else { limit };
+        ahead.resize(state.positions.len(), Ahead::default());
+        for (&part, &vertex) in self.parts.iter().zip(&self.vertices) {
+            let p = vertex as usize;
+            let part = &parts[part as usize];
+            let own = part.beside(state.positions[p], state.velocities[p]) * state.frame_time;
+            ahead[p] = Ahead {
+                own: most(own),
+                towards_others: most(part.approach_of_others() * state.frame_time),
+            };
         }
         all
     }
@@ -482,7 +552,7 @@ impl ContactDetector {
     fn has_slid(&self, state: &ContactState<'_>) -> bool {
         let skin = self.settings.skin * self.mean_edge;
         let close = 0.5 * skin + self.settings.thickness;
-        let mut candidates = self.faces.iter().zip(&self.sightings);
+        let mut candidates = self.face_candidates.iter().zip(&self.sightings);
         candidates.any(|(contact, sighting)| {
             let [_, second, third] = beneath(contact, state.positions);
             let [before2, before3] = sighting.weights;
@@ -585,7 +655,6 @@ impl ContactDetector {
             areas,
             found,
             parts,
-            last_edges,
             ..
         } = &mut self.room;
         let (normals, areas) = (&*normals, &*areas);
@@ -636,35 +705,30 @@ impl ContactDetector {
             let vertices = self.vertices.par_iter().zip(&self.parts).zip(found);
             vertices.with_min_len(PARALLEL / 4).for_each(ask);
         }
-        std::mem::swap(&mut self.edges, last_edges);
-        self.features.search(&query, &mut self.edges);
+        self.features.search(&query, &mut self.edge_candidates);
     }
 
     /// Makes lists of what was found for the vertices.
     fn collect(&mut self, state: &ContactState<'_>) {
         let Room {
-            found,
-            last_faces,
-            last_inside,
-            ..
+            found, last_inside, ..
         } = &mut self.room;
-        std::mem::swap(&mut self.faces, last_faces);
         std::mem::swap(&mut self.inside, last_inside);
-        self.faces.clear();
+        self.face_candidates.clear();
         self.inside.clear();
         self.sightings.clear();
         self.searched_at.clear();
         (self.deep, self.buried) = (0, 0);
         for (&vertex, found) in self.vertices.iter().zip(found) {
             self.searched_at.push(state.positions[vertex as usize]);
-            self.faces.extend_from_slice(found.contacts());
+            self.face_candidates.extend_from_slice(found.contacts());
             if found.inside != NONE {
                 self.inside.push((ParticleId(vertex), TetId(found.inside)));
             }
             self.deep += usize::from(found.is_deep);
             self.buried += usize::from(found.is_buried);
         }
-        for contact in &self.faces {
+        for contact in &self.face_candidates {
             let [_, second, third] = beneath(contact, state.positions);
             self.sightings.push(Sighting {
                 weights: [second, third],
@@ -673,23 +737,36 @@ impl ContactDetector {
         }
     }
 
-    /// The contacts across fresh cuts whose sides are near each other.
+    /// The contacts across fresh cuts whose sides the frame may bring together.
     #[must_use]
     pub fn pairs(&self) -> &[PairContact] {
         &self.pairs
     }
 
-    /// The candidates of the search: a vertex and a triangle each, ascending by vertex; at most four for a vertex.
+    /// The candidates of the search that the frame may bring together: a vertex and a triangle each, ascending by vertex;
+    /// at most four for a vertex.
     #[must_use]
     pub fn faces(&self) -> &[FaceContact] {
         &self.faces
     }
 
-    /// The candidates of feature edges, ascending by the ends of the first edge, then the second. Each two edges are there
-    /// once.
+    /// The candidates of feature edges that the frame may bring together, ascending by the ends of the first edge, then the
+    /// second. Each two edges are there once, and an edge at most four times.
     #[must_use]
     pub fn edges(&self) -> &[EdgeContact] {
         &self.edges
+    }
+
+    /// All candidates of the last search for vertices, of which [`Self::faces`] are those that the frame may bring together.
+    #[must_use]
+    pub fn face_candidates(&self) -> &[FaceContact] {
+        &self.face_candidates
+    }
+
+    /// All candidates of the last search for edges, of which [`Self::edges`] are those that the frame may bring together.
+    #[must_use]
+    pub fn edge_candidates(&self) -> &[EdgeContact] {
+        &self.edge_candidates
     }
 
     /// How many edges are sharp enough to be looked at, as of the last search.
@@ -775,6 +852,44 @@ impl ContactDetector {
             return Err(ContactError::Differs("the trees miss triangles".to_owned()));
         }
         Ok(())
+    }
+}
+
+/// How far a vertex may move in a frame, in m, each at most what the search looks ahead.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ahead {
+    /// Beside the motion of its part as a whole.
+    own: f64,
+    /// By that motion, towards other parts near it.
+    towards_others: f64,
+}
+
+/// Decides which contacts a frame may bring together.
+#[derive(Clone, Copy)]
+struct Near<'a> {
+    fixed: &'a [bool],
+    /// How far in m they may be apart beyond what the motion of the frame brings them together.
+    spare: f64,
+    /// The most in m that the search looks ahead.
+    limit: f64,
+}
+
+impl Near<'_> {
+    /// Whether the particles of one side may meet those of the other in the frame, and one of them can move. An overlap is
+    /// near in any case, so that reports tell of one that nothing can part.
+    fn of(&self, ahead: &[Ahead], one: &[u32], other: &[u32], gap: f64) -> bool {
+        let is_fixed = |p: &u32| self.fixed.get(*p as usize).copied().unwrap_or_default();
+        if one.iter().chain(other).all(is_fixed) {
+            return gap < 0.0;
+        }
+        let most = |of: &[u32]| {
+            let own = of.iter().map(|&p| ahead[p as usize].own);
+            own.fold(0.0, f64::max)
+        };
+        let towards = ahead[one[0] as usize].towards_others;
+        // What is no number is kept.
+        let is_apart = gap > self.spare + (most(one) + most(other) + towards).min(self.limit);
+        !is_apart
     }
 }
 

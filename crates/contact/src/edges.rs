@@ -13,7 +13,9 @@
 //!    which two edges, and not a vertex and a face, are what touches: on the sphere of normals, the arc between the
 //!    triangles of one edge crosses the opposite of the other's;
 //! 5. where they have passed each other, a way through tets leads from one of the edges to the other, as for a vertex, and
-//!    goes on as far again.
+//!    goes on as far again;
+//! 6. it is one of the four nearest of either edge, those that have passed each other first, deepest first: a long edge
+//!    over a fine rim has many near it, and is held by some of them.
 //!
 //! The normal is the cross product of both directions, taken from the present positions in each update, with the sign
 //! that it had when the candidate was found: it does not change when the edges pass each other.
@@ -39,6 +41,8 @@ const PARALLEL: f64 = 0.05;
 const BENT: f64 = 0.1;
 /// Edges whose closest points lie beyond their ends are no candidate if they have passed by this, in mean edges.
 const PASSED: f64 = 0.01;
+/// Candidates kept of an edge.
+const NEAREST: usize = 4;
 /// Edges that one task looks at.
 const CHUNK: usize = 128;
 
@@ -75,6 +79,16 @@ impl EdgeContact {
         let [a, b, c, d] = self.particles.map(|p| positions[p as usize]);
         let [p, q] = closest_on_segments([a, b], [c, d]);
         p.distance(q)
+    }
+
+    /// The gap where the edges have passed each other, otherwise their distance.
+    pub(crate) fn separation(&self, positions: &[DVec3]) -> f64 {
+        let gap = self.gap(positions);
+        if gap < 0.0 {
+            gap
+        } else {
+            self.distance(positions)
+        }
     }
 
     /// Takes the normal from the present positions; it stays where the edges are nearly parallel.
@@ -169,7 +183,13 @@ pub(crate) struct FeatureEdges {
     /// What each task found: room for a search.
     #[cfg_attr(feature = "serde", serde(skip))]
     found: Vec<Vec<EdgeContact>>,
+    /// Each candidate by both of its edges: room for a search.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    by_edge: Vec<Ranked>,
 }
+
+/// The ends of an edge, the separation and the number of one of its candidates.
+type Ranked = ([u32; 2], f64, u32);
 
 impl FeatureEdges {
     /// Lists the edges of a surface; `rest` are the positions at rest. O(triangles).
@@ -256,6 +276,31 @@ impl FeatureEdges {
         }
         contacts.clear();
         self.found.iter().for_each(|found| contacts.extend(found));
+        self.keep_nearest(query.state.positions, contacts);
+    }
+
+    /// Leaves out the candidates that are not among the nearest of both edges.
+    fn keep_nearest(&mut self, positions: &[DVec3], contacts: &mut Vec<EdgeContact>) {
+        let by_edge = &mut self.by_edge;
+        by_edge.clear();
+        for (number, contact) in (0..).zip(&*contacts) {
+            let ([a, b, c, d], by) = (contact.particles, contact.separation(positions));
+            by_edge.extend([([a, b], by, number), ([c, d], by, number)]);
+        }
+        by_edge.sort_unstable_by(|one, other| {
+            let by_separation = one.1.total_cmp(&other.1);
+            one.0
+                .cmp(&other.0)
+                .then(by_separation)
+                .then(one.2.cmp(&other.2))
+        });
+        for of_edge in by_edge.chunk_by(|one, other| one.0 == other.0) {
+            for (_, _, number) in of_edge.iter().skip(NEAREST) {
+                // No edge has its own end twice.
+                contacts[*number as usize].particles[1] = contacts[*number as usize].particles[0];
+            }
+        }
+        contacts.retain(|contact| contact.particles[0] != contact.particles[1]);
     }
 }
 

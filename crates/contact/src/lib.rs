@@ -35,6 +35,7 @@
 //!     pieces: &pieces,
 //!     positions,
 //!     velocities: &velocities,
+//!     fixed: &[],
 //!     frame_time: 1.0 / 60.0,
 //! });
 //! assert!(update.faces_changed);

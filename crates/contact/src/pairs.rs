@@ -13,8 +13,8 @@
 //! Where cuts cross, a particle has several copies; only those that share twins are paired, never all with all. A cut
 //! that splits both sides of an earlier one at the same places leaves parts that are twins again. A pair
 //! ends when the sides have slid apart by a quarter of an edge (or half the way out of the triangles around it), when they fold, or when a later cut took its
-//! faces. It does not come back: from then on the search takes care of both particles. A pair whose sides are further
-//! apart than the search reaches sleeps: it is left out of the list, and is there again when they come close.
+//! faces. It does not come back: from then on the search takes care of both particles. A pair whose sides the frame does
+//! not bring together sleeps: it is left out of the list, and is there again when they come close.
 //!
 //! Cost: a delta costs what the boundary lost and gained; an update is a pass over the twins.
 
@@ -418,13 +418,13 @@ impl FreshPairs {
         }
     }
 
-    /// Ends the pairs that have slid apart or folded, and lists the others that are at most `reach` apart, ascending by
-    /// their numbers.
+    /// Ends the pairs that have slid apart or folded, and lists the others that are near each other by their particles and
+    /// their gap, ascending by their numbers.
     pub(crate) fn evaluate(
         &mut self,
         surface: &ContactSurface,
         positions: &[DVec3],
-        reach: f64,
+        is_near: impl Fn([u32; 2], f64) -> bool,
         list: &mut Vec<PairContact>,
     ) -> Evaluated {
         list.clear();
@@ -462,7 +462,7 @@ impl FreshPairs {
             if !holds {
                 pair.is_retired = true;
                 retired = true;
-            } else if gap <= reach {
+            } else if is_near(pair.particles, gap) {
                 list.push(PairContact {
                     particles: pair.particles,
                     normal,

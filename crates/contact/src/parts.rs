@@ -53,6 +53,8 @@ pub(crate) struct Part {
     pub(crate) bounds: Bounds,
     /// Whether another part that it may touch is near.
     pub(crate) is_near: bool,
+    /// The largest speed in m/s of such a part relative to it, both as a whole, where they are near.
+    approach: f64,
     /// A vertex, from which sums are taken.
     origin: DVec3,
     count: f64,
@@ -69,6 +71,7 @@ impl Part {
         body: NONE,
         bounds: Bounds::EMPTY,
         is_near: false,
+        approach: 0.0,
         origin: DVec3::ZERO,
         count: 0.0,
         center: DVec3::ZERO,
@@ -136,18 +139,48 @@ impl Part {
         self.fields[0].spin.length()
     }
 
-    /// How much closer points of two parts may have come to each other in m that are within `reach` of each other now, and
-    /// at which speed they may do so in m/s.
-    pub(crate) fn towards(&self, other: &Self, reach: f64) -> [f64; 2] {
-        // Where such points are.
+    /// Notes another part near it that it may touch, and how fast the two may approach as a whole.
+    pub(crate) fn meet(&mut self, approach: f64) {
+        self.is_near = true;
+        self.approach = self.approach.max(approach);
+    }
+
+    /// The largest speed that was noted, in m/s.
+    pub(crate) fn approach_of_others(&self) -> f64 {
+        self.approach
+    }
+
+    /// The speed of a vertex in m/s beside the motion of the part as a whole.
+    pub(crate) fn beside(&self, x: DVec3, velocity: DVec3) -> f64 {
+        let [_, velocities] = &self.fields;
+        velocity.distance(velocities.rigid(x - self.center))
+    }
+
+    /// The speed in m/s at which the motions of two parts as a whole may bring points together that are within `reach` of
+    /// each other.
+    pub(crate) fn approach(&self, other: &Self, reach: f64) -> f64 {
+        self.whole(other, reach, 1).0
+    }
+
+    /// What the rigid motions of two fields differ by where the parts are near each other, and the difference there in the
+    /// middle with what it varies by.
+    fn whole(&self, other: &Self, reach: f64, k: usize) -> (f64, DVec3, f64) {
         let low = self.bounds.low.max(other.bounds.low) - reach;
         let high = self.bounds.high.min(other.bounds.high) + reach;
         let (middle, half) = ((low + high) / 2.0, (high - low).length() / 2.0);
+        let (one, two) = (&self.fields[k], &other.fields[k]);
+        let between = one.rigid(middle - self.center) - two.rigid(middle - other.center);
+        let turned = (one.spin - two.spin).length() * half + two.spin.length() * reach;
+        (between.length() + turned, between, turned)
+    }
+
+    /// How much closer points of two parts may have come to each other in m that are within `reach` of each other now, and
+    /// at which speed they may do so in m/s.
+    pub(crate) fn towards(&self, other: &Self, reach: f64) -> [f64; 2] {
         [0, 1].map(|k| {
             let (one, two) = (&self.fields[k], &other.fields[k]);
-            let between = one.rigid(middle - self.center) - two.rigid(middle - other.center);
+            let (_, between, turned) = self.whole(other, reach, k);
             let rest = furthest(&one.rest, &two.rest, between);
-            let turned = (one.spin - two.spin).length() * half + two.spin.length() * reach;
             (rest + turned).min(furthest(&one.whole, &two.whole, DVec3::ZERO))
         })
     }

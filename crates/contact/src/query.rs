@@ -331,7 +331,7 @@ impl Query<'_> {
             found.push(self.contact(&vertex, near));
         }
         let mut ways = inside.iter();
-        let nearest = ways.find_map(|near| Some((near, self.way(near, &vertex)?)));
+        let nearest = ways.find_map(|near| Some((near, self.way(near, &vertex, x)?)));
         let shallow = nearest.filter(|(near, _)| self.is_shallow(near, x));
         if let Some((near, tet)) = shallow {
             found.push(self.contact(&vertex, near));
@@ -493,9 +493,9 @@ impl Query<'_> {
         self.ways(near, twice).next().is_some()
     }
 
-    /// The tet at the end of a way through tets from a triangle to the vertex, which is none of its own.
-    fn way(&self, near: &Near, vertex: &Vertex<'_>) -> Option<TetId> {
-        let mut ends = self.ways(near, vertex.x);
+    /// The tet at the end of a way through tets from a triangle to a point at the vertex, which is none of its own.
+    fn way(&self, near: &Near, vertex: &Vertex<'_>, to: DVec3) -> Option<TetId> {
+        let mut ends = self.ways(near, to);
         ends.find(|&tet| !self.is_own(tet, vertex))
     }
 
@@ -551,7 +551,8 @@ impl Query<'_> {
     }
 
     /// The nearest triangle of the boundary around the tet that contains the vertex from which a way leads to it: among
-    /// those that face it, unless another one is much nearer or none does.
+    /// those that face it, unless another one is much nearer or none does. Ways lead to the point behind the vertex, which
+    /// is what the tet contains: a vertex that touches may be outside by rounding.
     ///
     /// Tets are looked at in the order of the distances of the faces that they are entered by, so that a way through many
     /// thin tets is found before one through a few large ones.
@@ -584,7 +585,7 @@ impl Query<'_> {
                         let (near, faces) = self.deep(vertex, slot);
                         let best = if faces { &mut facing } else { &mut other };
                         let is_nearer = best.is_none_or(|best| near.precedes(&best));
-                        if is_nearer && self.way(&near, vertex).is_some() {
+                        if is_nearer && self.way(&near, vertex, vertex.behind).is_some() {
                             *best = Some(near);
                         }
                     }

@@ -14,6 +14,9 @@ pub struct ContactState<'a> {
     pub positions: &'a [DVec3],
     /// Their velocities in m/s.
     pub velocities: &'a [DVec3],
+    /// By particle whether no force moves it; empty where all can be moved. Contacts of such particles alone are not
+    /// listed unless they overlap.
+    pub fixed: &'a [bool],
     /// How long the list will be used: the time of a frame in s, or of a part of it.
     pub frame_time: f64,
 }

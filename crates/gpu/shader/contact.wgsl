@@ -9,6 +9,8 @@ override KEEPS: bool = false;
 const NONE: u32 = 0xffffffffu;
 // The sine of the angle between two edges up to which they count as parallel, squared.
 const PARALLEL_SQUARED: f32 = 0.0001;
+// One over how many times the part of an overlap that is taken back a particle may be moved by.
+const PER_MOVE: f32 = 0.25;
 
 struct ContactUniform {
     friction: f32,
@@ -353,7 +355,7 @@ fn solve_contact(index: u32) {
     }
     let plane = gap.plane;
     let shares = plane.shares;
-    let sum = contact.now[0].w * shares.x * shares.x
+    var sum = contact.now[0].w * shares.x * shares.x
         + contact.now[1].w * shares.y * shares.y
         + contact.now[2].w * shares.z * shares.z
         + contact.now[3].w * shares.w * shares.w;
@@ -361,6 +363,11 @@ fn solve_contact(index: u32) {
     if !(sum > 0.0) {
         return;
     }
+    var most = 0.0;
+    for (var k = 0; k < 4; k++) {
+        most = max(most, contact.now[k].w * abs(shares[k]));
+    }
+    sum = max(sum, most * PER_MOVE);
     var change = -(gap.residual / sum);
     if before + change < 0.0 {
         change = -before;

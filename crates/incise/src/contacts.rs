@@ -162,6 +162,8 @@ pub(crate) struct Contacts {
 struct Room {
     positions: Vec<DVec3>,
     velocities: Vec<DVec3>,
+    /// Whether no force moves a particle.
+    fixed: Vec<bool>,
     pairs: Vec<PairContact>,
     /// The depth in m and the particles of the deepest contact at the end of a part of a frame.
     deepest: (f64, [u32; 2]),
@@ -280,12 +282,16 @@ impl Contacts {
         let Room {
             positions,
             velocities,
+            fixed,
             ..
         } = &mut self.room;
         each!(solver, solver => {
+            let particles = 0..solver.particle_count();
             solver.positions(positions);
             velocities.clear();
-            velocities.extend((0..solver.particle_count()).map(|p| solver.velocity(p)));
+            velocities.extend(particles.clone().map(|p| solver.velocity(p)));
+            fixed.clear();
+            fixed.extend(particles.map(|p| !solver.is_free(p)));
         });
     }
 
@@ -304,6 +310,7 @@ impl Contacts {
             pieces,
             positions: &self.room.positions,
             velocities: &self.room.velocities,
+            fixed: &self.room.fixed,
             frame_time: time,
         });
         let particles = self.room.positions.len();
@@ -313,9 +320,9 @@ impl Contacts {
             self.pair_colors = colors(particles, all)?;
         }
         let (faces, edges) = (self.detector.faces().len(), self.detector.edges().len());
-        if update.searched || faces + edges != self.surfaces.len() {
+        let lists = update.faces_changed || update.edges_changed;
+        if update.searched || lists || faces + edges != self.surfaces.len() {
             self.list_surfaces(&mesh.mesh().positions);
-            let lists = update.faces_changed || update.edges_changed;
             if lists || self.surfaces.len() != self.surface_colors.vertex_count() {
                 let all = self.surfaces.iter().map(SurfaceContact::particles);
                 self.surface_colors = colors(particles, all)?;

@@ -185,6 +185,7 @@ fn after_200_deltas() {
         pieces: &scene.pieces,
         positions: &scene.positions,
         velocities: &scene.velocities,
+        fixed: &scene.fixed,
         frame_time: scene.frame_time,
     });
     let reach = fresh.reach().min(scene.contacts.reach());

@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use crate::oracle::expected_edges;
 use crate::scene::{Scene, direction, jittered_box, noise};
 
-fn placed(mut mesh: TetMesh, turn: DQuat, by: DVec3) -> TetMesh {
+pub(crate) fn placed(mut mesh: TetMesh, turn: DQuat, by: DVec3) -> TetMesh {
     for x in &mut mesh.positions {
         *x = turn * *x + by;
     }
@@ -46,7 +46,7 @@ fn wedge_up(size: DVec3, along: DVec3, at: DVec3) -> TetMesh {
 
 /// Compares with the slow search after an update that searched.
 fn compare(scene: &Scene) -> usize {
-    let edges = scene.contacts.edges();
+    let edges = scene.contacts.edge_candidates();
     let found: Vec<[u32; 4]> = edges.iter().map(|contact| contact.particles).collect();
     let expected: Vec<[u32; 4]> = expected_edges(scene).into_iter().collect();
     let described = |key: &[u32; 4]| {

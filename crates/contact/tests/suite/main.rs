@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a helper that fails fails its test")]
 
+mod ahead;
 mod candidates;
 mod edges;
 mod fresh_pairs;

@@ -38,9 +38,22 @@ struct Slow<'a> {
     partners: BTreeMap<u32, BTreeSet<u32>>,
 }
 
-/// All candidates of edges at the present positions: each feature edge against each other one.
+/// All candidates of edges at the present positions: each feature edge against each other one, and of these the four
+/// nearest of both.
 pub(crate) fn expected_edges(scene: &Scene) -> BTreeSet<[u32; 4]> {
-    slow(scene).edges()
+    let all = slow(scene).edges();
+    let is_near = |(key, by): (&[u32; 4], &f64)| {
+        let ends = [&key[..2], &key[2..]];
+        ends.into_iter().all(|ends| {
+            let of_edge = all
+                .iter()
+                .filter(|(k, _)| k[..2] == *ends || k[2..] == *ends);
+            let nearer = of_edge.filter(|(k, b)| b.total_cmp(by).then(k.cmp(&key)).is_lt());
+            nearer.count() < 4
+        })
+    };
+    let near = all.iter().filter(|&candidate| is_near(candidate));
+    near.map(|(key, _)| *key).collect()
 }
 
 /// All candidates at the present positions.
@@ -66,6 +79,7 @@ fn slow(scene: &Scene) -> Slow<'_> {
         pieces: &scene.pieces,
         positions: &scene.positions,
         velocities: &scene.velocities,
+        fixed: &scene.fixed,
         frame_time: scene.frame_time,
     };
     let mut partners: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
@@ -338,7 +352,8 @@ impl Slow<'_> {
         seen(&self.scene.positions).distance(seen(&self.scene.body.mesh().positions))
     }
 
-    fn edges(&self) -> BTreeSet<[u32; 4]> {
+    /// All candidates of edges, each with its gap if that is negative, otherwise the distance.
+    fn edges(&self) -> BTreeMap<[u32; 4], f64> {
         let positions = &self.state.positions;
         // Both triangles of each edge, first the one in which it runs upward.
         let mut around: BTreeMap<[u32; 2], [Option<BoundaryTriangle>; 2]> = BTreeMap::new();
@@ -377,7 +392,7 @@ impl Slow<'_> {
                 features.push((ends, [one, two], [far(&one), far(&two)]));
             }
         }
-        let mut found = BTreeSet::new();
+        let mut found = BTreeMap::new();
         for (i, (ends, tets, far)) in features.iter().enumerate() {
             for (others, other_tets, other_far) in &features[i + 1..] {
                 let none = BTreeSet::new();
@@ -458,7 +473,8 @@ impl Slow<'_> {
                     gap > -0.01 * self.scene.contacts.mean_edge()
                 };
                 if is_valid {
-                    found.insert([ends[0], ends[1], others[0], others[1]]);
+                    let by = if gap < 0.0 { gap } else { distance };
+                    found.insert([ends[0], ends[1], others[0], others[1]], by);
                 }
             }
         }
@@ -529,9 +545,10 @@ fn barycentric(corners: [DVec3; 4], x: DVec3) -> [f64; 4] {
 
 /// The candidates of the detector.
 pub(crate) fn found(scene: &Scene) -> BTreeSet<Key> {
-    let contacts = scene.contacts.faces().iter();
+    let contacts = scene.contacts.face_candidates().iter();
     let found: BTreeSet<Key> = contacts.map(|contact| key_of(contact.particles)).collect();
-    assert_eq!(found.len(), scene.contacts.faces().len(), "each once");
+    let count = scene.contacts.face_candidates().len();
+    assert_eq!(found.len(), count, "each once");
     found
 }
 

@@ -31,6 +31,7 @@ fn continues_bit_for_bit() {
             pieces: &scene.pieces,
             positions: &scene.positions,
             velocities: &scene.velocities,
+            fixed: &[],
             frame_time: scene.frame_time,
         });
         assert_eq!(update, same);

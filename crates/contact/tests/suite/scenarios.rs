@@ -379,7 +379,7 @@ fn past_a_rim_nothing_is_held() {
             compare(&scene);
             scene.positions.clone_from(&settled);
             let (mut held, mut beside) = (0, 0);
-            for contact in scene.contacts.faces() {
+            for contact in scene.contacts.face_candidates() {
                 let x = scene.positions[contact.particles[0] as usize];
                 if contact.particles[0] < 64 || contact.particles[1] >= 64 {
                     continue;
@@ -416,7 +416,7 @@ fn contacts_turn_with_their_bodies() {
     let rest = scene.positions.clone();
     let turn = DQuat::from_axis_angle(DVec3::new(0.48, 0.6, 0.64), 1.1);
     let turned: Vec<DVec3> = rest.iter().map(|x| turn * *x + DVec3::X).collect();
-    let contacts = scene.contacts.faces();
+    let contacts = scene.contacts.face_candidates();
     for contact in contacts {
         assert!((contact.gap(&turned) - contact.gap(&rest)).abs() < 1e-12);
         let normal = turn * contact.normal_at(&rest);
@@ -678,6 +678,7 @@ fn kept_lists_are_complete() {
                 pieces: &scene.pieces,
                 positions: &scene.positions,
                 velocities: &scene.velocities,
+                fixed: &scene.fixed,
                 frame_time: FRAME,
             });
             let skin = fresh.settings().skin * fresh.mean_edge();

@@ -65,6 +65,7 @@ pub(crate) struct Scene {
     pub(crate) contacts: ContactDetector,
     pub(crate) positions: Vec<DVec3>,
     pub(crate) velocities: Vec<DVec3>,
+    pub(crate) fixed: Vec<bool>,
     pub(crate) frame_time: f64,
 }
 
@@ -78,6 +79,7 @@ impl Scene {
             contacts,
             positions: body.mesh().positions.clone(),
             velocities: vec![DVec3::ZERO; body.mesh().positions.len()],
+            fixed: Vec::new(),
             frame_time: FRAME,
             body,
         }
@@ -89,6 +91,7 @@ impl Scene {
             pieces: &self.pieces,
             positions: &self.positions,
             velocities: &self.velocities,
+            fixed: &self.fixed,
             frame_time: self.frame_time,
         };
         self.contacts.update(&state)

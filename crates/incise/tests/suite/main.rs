@@ -12,6 +12,7 @@ mod constraints;
 mod contact;
 mod contact_cases;
 mod contact_edges;
+mod contact_shapes;
 mod contact_states;
 mod cutting;
 mod determinism;

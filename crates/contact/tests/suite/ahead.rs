@@ -1,0 +1,219 @@
+//! Which candidates are listed for a frame: those that its motion may bring together, and that something can move.
+
+use std::collections::BTreeSet;
+
+use glam::{DQuat, DVec3};
+use incise_contact::{ContactSettings, EdgeContact};
+use incise_mesh::{TetMesh, closest_on_triangle, kuhn_box};
+
+use crate::edges::{placed, wedge_down};
+use crate::oracle::compare;
+use crate::scene::{FRAME, Scene, direction, jittered_box, noise};
+
+fn two_boxes(gap: f64, settings: ContactSettings) -> Scene {
+    let below = jittered_box(4, 0.0, 1);
+    let above = placed(
+        jittered_box(4, 0.0, 2),
+        DQuat::IDENTITY,
+        DVec3::new(0.11, 0.07, 1.0 + gap),
+    );
+    Scene::new(&[below, above], settings)
+}
+
+/// What is left out does not meet within the frame when all particles move on at their speeds, and what overlaps is
+/// listed. Random bodies that fly, turn and shake, cut at random.
+#[test]
+fn what_is_left_out_does_not_meet() {
+    let (mut left_out, mut listed) = (0, 0);
+    for seed in 0..12 {
+        let bodies: Vec<TetMesh> = (0..3)
+            .map(|i| {
+                let turn = DQuat::from_axis_angle(direction(seed, i), 2.0 * noise(seed, 70 + i));
+                placed(
+                    jittered_box(3, 0.2, seed),
+                    turn,
+                    direction(seed ^ 5, i) * 0.8,
+                )
+            })
+            .collect();
+        let mut scene = Scene::new(&bodies, ContactSettings::default());
+        scene.cut(0, direction(seed, 9) * 0.2, direction(seed, 8));
+        let edge = scene.contacts.mean_edge();
+        for frame in 0..6 {
+            let pieces: Vec<Vec<usize>> = (0..4).map(|piece| scene.particles_of(piece)).collect();
+            for (i, particles) in pieces.iter().enumerate() {
+                let spin = direction(seed ^ 3, i) * noise(seed, i);
+                let drift = direction(seed ^ 4, i) * (0.2 * edge / FRAME);
+                for &p in particles {
+                    let shake = direction(seed ^ 7, 100 * frame + p) * (0.1 * edge / FRAME);
+                    scene.velocities[p] = drift + spin.cross(scene.positions[p]) + shake;
+                }
+            }
+            // Where the sides of a fresh cut coincide, what is nearest is a matter of rounding.
+            if scene.update().searched && frame > 0 {
+                compare(&scene);
+            }
+            let faces: BTreeSet<[u32; 4]> =
+                scene.contacts.faces().iter().map(|c| c.particles).collect();
+            let limit = scene.contacts.settings().reach * edge;
+            for candidate in scene.contacts.face_candidates() {
+                if faces.contains(&candidate.particles) {
+                    listed += 1;
+                    continue;
+                }
+                left_out += 1;
+                assert!(
+                    candidate.gap(&scene.positions) > 0.0,
+                    "what overlaps is listed"
+                );
+                let moved = candidate
+                    .particles
+                    .map(|p| scene.velocities[p as usize] * FRAME);
+                let most = moved[1..]
+                    .iter()
+                    .map(|by| by.distance(moved[0]))
+                    .fold(0.0, f64::max);
+                // Frames in which more approaches are divided.
+                if most > limit {
+                    continue;
+                }
+                for part in [0.25, 0.5, 0.75, 1.0] {
+                    let at = |k: usize| {
+                        scene.positions[candidate.particles[k] as usize] + moved[k] * part
+                    };
+                    let closest = closest_on_triangle([at(1), at(2), at(3)], at(0)).point;
+                    let apart = closest.distance(at(0));
+                    assert!(apart > 1e-3 * edge, "{candidate:?} meet: {apart}");
+                }
+            }
+            let velocities = scene.velocities.clone();
+            for (x, v) in scene.positions.iter_mut().zip(velocities) {
+                *x += v * FRAME;
+            }
+        }
+    }
+    assert!(
+        left_out > 200 && listed > 200,
+        "{left_out} left out, {listed} listed"
+    );
+}
+
+/// A vertex that moves fast brings its own contacts into the list and leaves those of others out.
+#[test]
+fn a_fast_vertex_looks_further_alone() {
+    let settings = ContactSettings {
+        skin: 0.2,
+        ..ContactSettings::default()
+    };
+    // Within the skin, and beyond what is listed at rest.
+    let mut scene = two_boxes(0.0, settings);
+    let gap = 0.15 * scene.contacts.mean_edge();
+    scene.shift(1, DVec3::Z * gap);
+    scene.search();
+    let all = compare(&scene).contacts.len();
+    assert!(
+        all > 30 && scene.contacts.faces().is_empty(),
+        "nothing moves"
+    );
+    let inner = |x: DVec3| x.x > 0.3 && x.x < 0.9 && x.y > 0.3 && x.y < 0.9;
+    let fast = (0..scene.positions.len())
+        .find(|&p| (scene.positions[p].z - 1.0 - gap).abs() < 1e-9 && inner(scene.positions[p]))
+        .unwrap();
+    scene.velocities[fast] = DVec3::NEG_Z * (0.3 * scene.contacts.mean_edge() / FRAME);
+    scene.search();
+    let listed = scene.contacts.faces();
+    assert!(
+        !listed.is_empty() && listed.len() < all / 2,
+        "{} of {all}",
+        listed.len()
+    );
+    for contact in listed {
+        assert!(
+            contact.particles.map(|p| p as usize).contains(&fast),
+            "{contact:?}"
+        );
+    }
+    // All of the body: all is listed.
+    for p in scene.particles_of(1) {
+        scene.velocities[p] = DVec3::NEG_Z * (0.3 * scene.contacts.mean_edge() / FRAME);
+    }
+    scene.search();
+    assert!(scene.contacts.faces().len() >= all);
+}
+
+/// Contacts of particles that nothing moves are not listed; those with one that moves are.
+#[test]
+fn contacts_that_nothing_moves_are_not_listed() {
+    let mut scene = two_boxes(1e-3, ContactSettings::default());
+    scene.search();
+    let all = scene.contacts.faces().len();
+    let (edges, lower) = (scene.contacts.edges().len(), scene.particles_of(0).len());
+    assert!(all > 30 && edges > 0);
+    scene.fixed = (0..scene.positions.len()).map(|p| p < lower).collect();
+    scene.search();
+    compare(&scene);
+    let counts = |scene: &Scene| (scene.contacts.faces().len(), scene.contacts.edges().len());
+    assert_eq!(counts(&scene), (all, edges), "the upper one moves");
+    scene.fixed.fill(true);
+    scene.search();
+    assert_eq!(counts(&scene), (0, 0));
+    compare(&scene);
+    // A particle that is let go of brings its contacts back, without a search.
+    let contact = scene.contacts.face_candidates()[0];
+    for p in contact.particles {
+        scene.fixed.fill(true);
+        scene.fixed[p as usize] = false;
+        let update = scene.update();
+        assert!(!update.searched && update.faces_changed);
+        let listed = scene.contacts.faces();
+        assert!(listed.contains(&contact) && listed.len() < all);
+        assert!(listed.iter().all(|contact| contact.particles.contains(&p)));
+        scene.fixed[p as usize] = true;
+        scene.update();
+    }
+}
+
+/// A long edge across a fine rim has four contacts, the deepest, and each of the fine edges its own.
+#[test]
+fn an_edge_has_its_nearest_contacts() {
+    let long = placed(
+        kuhn_box([1; 3], DVec3::splat(2.0)),
+        DQuat::from_rotation_x(std::f64::consts::FRAC_PI_4),
+        DVec3::ZERO,
+    );
+    let lowest = long
+        .positions
+        .iter()
+        .fold(f64::INFINITY, |low, x| low.min(x.z));
+    let long = placed(long, DQuat::IDENTITY, DVec3::new(-1.0, 0.0, 0.005 - lowest));
+    // Many wedges side by side, each with its upper edge across.
+    let mut bodies = vec![long];
+    for number in 0..9_u32 {
+        let at = DVec3::new(0.1 * f64::from(number) - 0.4, 0.013, 0.0);
+        let lower = wedge_down(DVec3::new(0.4, 0.05, 0.05), DVec3::Y, DVec3::ZERO);
+        let turn = DQuat::from_axis_angle(DVec3::Y, std::f64::consts::PI);
+        let height = 5e-4 * f64::from(7 * number % 9);
+        bodies.push(placed(lower, turn, at + DVec3::Z * height));
+    }
+    let settings = ContactSettings {
+        skin: 1.0,
+        ..ContactSettings::default()
+    };
+    let mut scene = Scene::new(&bodies, settings);
+    scene.search();
+    let expected = crate::oracle::expected_edges(&scene);
+    let edges = scene.contacts.edge_candidates();
+    let found: BTreeSet<[u32; 4]> = edges.iter().map(|contact| contact.particles).collect();
+    let missing: Vec<_> = expected.difference(&found).collect();
+    let more: Vec<_> = found.difference(&expected).collect();
+    assert!(found == expected, "missing {missing:?}, more {more:?}");
+    // The highest wedge is the nearest of all, and the lower edge of the box has it and three more.
+    let gap = |contact: &EdgeContact| contact.gap(&scene.positions);
+    let nearest = edges
+        .iter()
+        .min_by(|one, other| gap(one).total_cmp(&gap(other)))
+        .unwrap();
+    assert!((gap(nearest) - 1e-3).abs() < 1e-9, "{nearest:?}");
+    let of_long = |contact: &&EdgeContact| contact.particles[..2] == nearest.particles[..2];
+    assert_eq!(edges.iter().filter(of_long).count(), 4, "{edges:?}");
+}
