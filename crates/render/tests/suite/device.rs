@@ -22,7 +22,7 @@ fn assert_alike(renderer: &mut GpuRenderer, shown: &Shown, style: &Style, what: 
     let there = renderer
         .picture(render_scene, simulation, &camera, style, SIZE)
         .unwrap();
-    let here = software_picture(render_scene, simulation, &camera, style, SIZE);
+    let here = software_picture(render_scene, simulation.positions(), &camera, style, SIZE);
     let difference = Difference::of(&there, &here.unwrap(), 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -68,7 +68,14 @@ fn assert_present(
     what: &str,
 ) {
     simulation.read_back().unwrap();
-    let here = software_picture(render_scene, simulation, camera, &Style::default(), SIZE).unwrap();
+    let here = software_picture(
+        render_scene,
+        simulation.positions(),
+        camera,
+        &Style::default(),
+        SIZE,
+    )
+    .unwrap();
     let difference = Difference::of(there, &here, 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -129,7 +136,8 @@ fn positions_do_not_leave_the_device() {
         .picture(&render_scene, &simulation, &camera, &style, SIZE)
         .unwrap();
     // The host does not know yet how far it fell.
-    let old = software_picture(&render_scene, &simulation, &camera, &style, SIZE).unwrap();
+    let old =
+        software_picture(&render_scene, simulation.positions(), &camera, &style, SIZE).unwrap();
     let difference = Difference::of(&there, &old, 24);
     assert!(difference.mean > 1.0, "{difference:?}");
     assert_present(
