@@ -33,7 +33,7 @@ impl Session {
         outcome
     }
 
-    /// As [`Session::finish`], without errors.
+    /// Executes what waits; no error is expected.
     fn succeed(&mut self) -> Outcome {
         let outcome = self.finish();
         assert!(
