@@ -121,6 +121,12 @@ impl Viewer {
         viewer
     }
 
+    /// The device, which the threads of simulations keep while they use it.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn device(&self) -> std::sync::Weak<GpuContext> {
+        self.gpu.as_ref().map(Arc::downgrade).unwrap_or_default()
+    }
+
     fn load(&mut self, context: &Context, source: Source) {
         let (wake, gpu) = (context.clone(), self.gpu.clone());
         let wake = move || wake.request_repaint();
