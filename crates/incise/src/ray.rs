@@ -26,34 +26,60 @@ pub struct RayHit {
     pub tag: FaceTag,
 }
 
-/// Finds the first triangle that a ray meets from either side; of several at one distance the first in the list.
-pub(crate) fn first_hit(
-    triangles: impl Iterator<Item = BoundaryTriangle>,
-    positions: &[DVec3],
-    origin: DVec3,
-    direction: DVec3,
-) -> Option<RayHit> {
-    let mut first: Option<(BoundaryTriangle, f64)> = None;
-    for triangle in triangles {
-        let corners = triangle.particles.map(|p| positions[p.index()]);
-        let Some(distance) = meet(corners, origin, direction) else {
-            continue;
-        };
-        if first.is_none_or(|(_, nearest)| distance < nearest) {
-            first = Some((triangle, distance));
+impl RayHit {
+    /// Finds the first of some boundary triangles that a ray meets, from either side; of several at one distance the first
+    /// in the list. The direction may have any length but 0. O(triangles).
+    ///
+    /// [`Simulation::ray_cast`](crate::Simulation::ray_cast) does this for the present state of a simulation, this
+    /// function for a copy of its boundary and positions: a window can pick while the simulation steps on another thread.
+    ///
+    /// # Panics
+    /// If a particle of a triangle has no position.
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{RayHit, Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"box\", tets = 200 }")?;
+    /// let mut simulation = Simulation::new(&scene)?;
+    /// let boundary: Vec<_> = simulation.boundary().collect();
+    /// let positions = simulation.positions().to_vec();
+    /// let (origin, direction) = (DVec3::new(0.1, 0.05, 5.0), DVec3::NEG_Z);
+    /// let before = simulation.ray_cast(origin, direction);
+    /// simulation.step()?;
+    /// assert_eq!(RayHit::first(boundary, &positions, origin, direction), before);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn first(
+        triangles: impl IntoIterator<Item = BoundaryTriangle>,
+        positions: &[DVec3],
+        origin: DVec3,
+        direction: DVec3,
+    ) -> Option<Self> {
+        let mut first: Option<(BoundaryTriangle, f64)> = None;
+        for triangle in triangles {
+            let corners = triangle.particles.map(|p| positions[p.index()]);
+            let Some(distance) = meet(corners, origin, direction) else {
+                continue;
+            };
+            if first.is_none_or(|(_, nearest)| distance < nearest) {
+                first = Some((triangle, distance));
+            }
         }
+        first.map(|(triangle, distance)| {
+            let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
+            Self {
+                tet: triangle.tet,
+                particles: triangle.particles,
+                point: origin + direction * distance,
+                distance,
+                normal: (b - a).cross(c - a).normalize_or_zero(),
+                tag: triangle.tag,
+            }
+        })
     }
-    first.map(|(triangle, distance)| {
-        let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
-        RayHit {
-            tet: triangle.tet,
-            particles: triangle.particles,
-            point: origin + direction * distance,
-            distance,
-            normal: (b - a).cross(c - a).normalize_or_zero(),
-            tag: triangle.tag,
-        }
-    })
 }
 
 /// Distance along a ray to a triangle, in lengths of its direction; `None` if it misses.

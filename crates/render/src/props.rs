@@ -4,7 +4,6 @@
 //! facets to look smooth at usual sizes. Infinite planes are drawn as patches that fade out.
 
 use glam::{DQuat, DVec3, Vec3};
-use incise::Simulation;
 use incise::scene::{ColliderSpec, RotationSpec};
 
 use crate::RenderScene;
@@ -62,11 +61,11 @@ pub(crate) struct Props {
 }
 
 impl Props {
-    pub(crate) fn new(render_scene: &RenderScene, simulation: &Simulation, view: &View) -> Self {
+    pub(crate) fn new(render_scene: &RenderScene, view: &View) -> Self {
         let mut props = Self::default();
         let [low, high] = render_scene.start();
         let (middle, size) = ((low + high) * 0.5, (high - low).length().max(1e-6));
-        let time = simulation.report().time_s;
+        let time = render_scene.time();
         if let Some(ground) = render_scene.ground() {
             let point = DVec3::Z * ground.height;
             props.plane(view, point, DVec3::Z, middle, size, true);

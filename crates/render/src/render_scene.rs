@@ -44,12 +44,13 @@ const NONE: u32 = 0;
 ///     simulation.step()?;
 ///     render_scene.sync(&simulation);
 ///     let size = [64, 48];
-///     let picture = software_picture(&render_scene, &simulation, &camera, &Style::default(), size)?;
+///     let positions = simulation.positions();
+///     let picture = software_picture(&render_scene, positions, &camera, &Style::default(), size)?;
 ///     assert_eq!(picture.rgba.len(), 64 * 48 * 4);
 /// }
 /// # Ok::<(), incise_render::RenderError>(())
 /// ```
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct RenderScene {
     skin: Skin,
     /// Color of each triangle; empty if all are drawn as tissue.
@@ -64,7 +65,7 @@ pub struct RenderScene {
     /// Revision of the triangles' colors.
     coloring: u64,
     /// Simulated time of the last update, in s.
-    followed: f64,
+    time: f64,
     /// True if a device has made a step since the last topology change other than by its own cuts.
     device_is_current: bool,
     ground: Option<GroundSpec>,
@@ -89,7 +90,7 @@ impl RenderScene {
             topology: 0,
             plan: 0,
             coloring: revision(),
-            followed: 0.0,
+            time: 0.0,
             device_is_current: false,
             ground: scene.world.ground,
             obstacles: scene.collider.clone(),
@@ -109,10 +110,10 @@ impl RenderScene {
     /// If a step with a cut was skipped: use [`RenderScene::reset`] then.
     pub fn sync(&mut self, simulation: &Simulation) {
         let now = simulation.report().time_s;
-        if now == self.followed {
+        if now == self.time {
             return;
         }
-        self.followed = now;
+        self.time = now;
         self.device_is_current = true;
         if simulation.report().reclustered > 0 {
             self.plan = revision();
@@ -147,7 +148,7 @@ impl RenderScene {
         self.coloring = self.topology;
         self.colors.clear();
         self.made_for = None;
-        self.followed = simulation.report().time_s;
+        self.time = simulation.report().time_s;
         self.device_is_current = false;
     }
 
@@ -299,6 +300,10 @@ impl RenderScene {
     #[cfg(feature = "gpu")]
     pub(crate) fn device_is_current(&self) -> bool {
         self.device_is_current
+    }
+
+    pub(crate) fn time(&self) -> f64 {
+        self.time
     }
 
     pub(crate) fn ground(&self) -> Option<GroundSpec> {

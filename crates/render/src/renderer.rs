@@ -116,7 +116,9 @@ impl Renderer {
         match self {
             #[cfg(feature = "gpu")]
             Self::Gpu(renderer) => renderer.picture(render_scene, simulation, camera, style, size),
-            Self::Software => software_picture(render_scene, simulation, camera, style, size),
+            Self::Software => {
+                software_picture(render_scene, simulation.positions(), camera, style, size)
+            }
         }
     }
 }

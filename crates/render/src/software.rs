@@ -8,8 +8,7 @@
 //! image is the same for any number of threads. Cost: each band visits each triangle, O(bands x triangles); four passes
 //! over the rows of those in it, and one or two shadings per pixel.
 
-use glam::{Vec2, Vec3, Vec4};
-use incise::Simulation;
+use glam::{DVec3, Vec2, Vec3, Vec4};
 use incise::cutting::FaceTag;
 use rayon::prelude::*;
 
@@ -36,7 +35,9 @@ const CHUNK: usize = 512;
 /// Index of an empty sample.
 const NOTHING: u32 = u32::MAX;
 
-/// Draws an image on the processor from the host's positions: see [`Simulation::read_back`].
+/// Draws an image on the processor from the positions of all particles, usually those of
+/// [`Simulation::positions`](incise::Simulation::positions). A copy of both is enough to draw while the simulation steps
+/// on another thread.
 ///
 /// Equal input gives equal bytes for any number of threads.
 ///
@@ -44,19 +45,19 @@ const NOTHING: u32 = u32::MAX;
 /// If a side of the image is 0 or more than [`LARGEST_SIDE`].
 ///
 /// # Panics
-/// If the render scene does not match the simulation.
+/// If a particle of the render scene has no position.
 ///
 /// # Example
 /// See [`RenderScene`].
 pub fn software_picture(
     render_scene: &RenderScene,
-    simulation: &Simulation,
+    positions: &[DVec3],
     camera: &Camera,
     style: &Style,
     size: [u32; 2],
 ) -> Result<Image, RenderError> {
     let view = View::new(camera, size, LARGEST_SIDE)?;
-    let frame = Frame::new(view, render_scene, simulation, *style);
+    let frame = Frame::new(view, render_scene, positions, *style);
     let placed = frame.place();
     let [width, height] = size.map(|side| side as usize);
     let mut rgba = vec![0; 4 * width * height];
@@ -105,14 +106,8 @@ enum Kind<'a> {
 }
 
 impl<'a> Frame<'a> {
-    fn new(
-        view: View,
-        render_scene: &'a RenderScene,
-        simulation: &Simulation,
-        style: Style,
-    ) -> Self {
+    fn new(view: View, render_scene: &'a RenderScene, positions: &[DVec3], style: Style) -> Self {
         let skin = render_scene.skin();
-        let positions = simulation.positions();
         let origin = positions.first().copied().unwrap_or_default();
         let vertices = skin.vertices().par_iter().with_min_len(CHUNK);
         let local: Vec<Vec3> = vertices
@@ -130,7 +125,7 @@ impl<'a> Frame<'a> {
             .into_iter()
             .map(|position| position + from_eye)
             .collect();
-        let props = Props::new(render_scene, simulation, &view);
+        let props = Props::new(render_scene, &view);
         let ground = props.planes.iter().find(|plane| plane.ground);
         let contact_shadow =
             ground.map(|plane| ContactShadow::new(*plane, skin.triangles(), &positions));

@@ -1,7 +1,8 @@
 //! [`Viewer`]: the window.
 //!
-//! A frame of the window handles input, advances the simulation to real time, and draws picture, panel and overlays. An
-//! error while simulating pauses the simulation and opens a dialog.
+//! A frame of the window takes over what the simulation has done, handles input, draws picture, panel and overlays, and
+//! starts the frames that are due by real time. It never waits for them. An error while simulating pauses the simulation
+//! and opens a dialog.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -14,7 +15,7 @@ use incise::Support;
 use incise::gpu::GpuContext;
 use incise::mesh::glam::DVec3;
 use incise::scene::Backend;
-use incise_render::{ColorBy, Style};
+use incise_render::Style;
 use web_time::Instant;
 
 use crate::canvas::Canvas;
@@ -120,6 +121,12 @@ impl Viewer {
         viewer
     }
 
+    /// The device, which the threads of simulations keep while they use it.
+    #[cfg(not(target_family = "wasm"))]
+    pub(crate) fn device(&self) -> std::sync::Weak<GpuContext> {
+        self.gpu.as_ref().map(Arc::downgrade).unwrap_or_default()
+    }
+
     fn load(&mut self, context: &Context, source: Source) {
         let (wake, gpu) = (context.clone(), self.gpu.clone());
         let wake = move || wake.request_repaint();
@@ -149,20 +156,29 @@ impl Viewer {
     /// Shows an error and pauses.
     fn fail(&mut self, error: &anyhow::Error) {
         self.error = Some(ErrorDialog::new("Simulation paused by an error", error));
+        self.pause();
+    }
+
+    fn pause(&mut self) {
         self.running = false;
         self.clock.pause();
     }
 
-    fn check(&mut self, result: anyhow::Result<()>) {
-        if let Err(error) = result {
-            self.fail(&error);
+    /// Takes over what the simulation has done since the last frame of the window.
+    fn take_results(&mut self) {
+        let Some(outcome) = self.session.as_mut().and_then(Session::poll) else {
+            return;
+        };
+        // Without a pause the stroke would begin again at once.
+        if outcome.restarts {
+            self.pause();
         }
-    }
-
-    /// Calls a function with the session, if there is one, and shows its error.
-    fn with_session(&mut self, act: impl FnOnce(&mut Session) -> anyhow::Result<()>) {
-        if let Some(result) = self.session.as_mut().map(act) {
-            self.check(result);
+        // The simulation continues with its old settings.
+        if let Some(error) = outcome.refused {
+            self.error = Some(ErrorDialog::new("Setting not changed", &error));
+        }
+        if let Some(error) = outcome.error {
+            self.fail(&error);
         }
     }
 
@@ -192,7 +208,7 @@ impl Viewer {
             return;
         };
         self.loading = None;
-        match result.and_then(Session::new) {
+        match result {
             Ok(session) => {
                 context.send_viewport_cmd(egui::ViewportCommand::Title(format!(
                     "{} - incise",
@@ -216,30 +232,17 @@ impl Viewer {
                 self.clock.pause();
             }
             Action::Step => {
-                self.running = false;
+                self.pause();
                 self.with_session(Session::step);
             }
             Action::Reset => self.with_session(Session::reset),
-            Action::Undo => {
-                let undone = self.session.as_mut().map_or(Ok(None), Session::undo);
-                match undone {
-                    // Without a pause the stroke would begin again at once.
-                    Ok(Some(true)) => {
-                        self.running = false;
-                        self.clock.pause();
-                    }
-                    Ok(_) => {}
-                    Err(error) => self.fail(&error),
-                }
-            }
+            Action::Undo => self.with_session(Session::undo),
             Action::Use(tool) => {
                 self.release();
                 self.tool = tool;
+                self.with_session(|session| session.message = None);
             }
-            Action::Fit => self.with_session(|session| {
-                session.fit();
-                Ok(())
-            }),
+            Action::Fit => self.with_session(Session::fit),
             Action::Wireframe => self.style.wireframe = !self.style.wireframe,
             Action::Smooth => self.style.smooth = !self.style.smooth,
             Action::Color(by) => self.style.color_by = by,
@@ -255,9 +258,13 @@ impl Viewer {
     fn release(&mut self) {
         self.tool_in_use = false;
         self.line.clear();
+        self.with_session(Session::lift_blade);
+        self.with_session(Session::release);
+    }
+
+    fn with_session(&mut self, act: impl FnOnce(&mut Session)) {
         if let Some(session) = &mut self.session {
-            session.lift_blade();
-            session.release();
+            act(session);
         }
     }
 
@@ -300,76 +307,70 @@ impl Viewer {
             return;
         }
         let primary = PointerButton::Primary;
-        let mut result = Ok(());
         if response.drag_started_by(primary) && !orbits && !pans {
             let origin = context.input(|input| input.pointer.press_origin());
             let at = origin
                 .or(response.interact_pointer_pos())
                 .unwrap_or(rect.min);
             (self.tool_in_use, self.line) = (true, vec![at]);
-            result = match self.tool {
+            match self.tool {
                 Tool::Blade => session.press_blade(pixel(at), size),
-                _ => session.grab_at(pixel(at), size).map(|_| ()),
-            };
+                _ => session.grab_at(pixel(at), size),
+            }
         }
         if !self.tool_in_use {
             return;
         }
         let positions = pointer_positions(context);
-        result = result.and_then(|()| match self.tool {
-            Tool::Blade => positions.iter().try_for_each(|&at| {
+        if self.tool == Tool::Blade {
+            for at in positions {
                 self.line.push(at);
-                session.draw_blade(pixel(at), size)
-            }),
-            _ => positions
-                .last()
-                .map_or(Ok(()), |&at| session.pull(pixel(at), size)),
-        });
+                session.draw_blade(pixel(at), size);
+            }
+        } else if let Some(at) = positions.last() {
+            session.pull(pixel(*at), size);
+        }
         // The release of any button ends a drag, so the button itself decides.
         if !context.input(|input| input.pointer.button_down(primary)) {
             self.release();
         }
-        self.check(result);
     }
 
-    /// Simulates until simulated time has caught up with real time.
-    fn advance(&mut self) {
+    /// Starts the commands that wait and the frames that are due, unless the simulation is away.
+    fn advance(&mut self, context: &Context, picks: bool) {
         let Some(session) = &mut self.session else {
             return;
         };
-        if !self.running {
-            return;
+        let mut frames = 0;
+        if self.running && session.can_step() {
+            let (time_step, frame_ms) = (session.solver().time_step, session.view.frame_ms);
+            frames = self.clock.take_due(Instant::now(), time_step, frame_ms);
         }
-        let time_step = session.solver().time_step;
-        let mut result = Ok(());
-        self.clock.run(Instant::now(), time_step, || {
-            result = session.step();
-            result.is_ok()
+        let wake = context.clone();
+        session.start(frames, picks || self.canvas.needs_positions(), move || {
+            wake.request_repaint();
         });
-        self.check(result);
     }
 
     fn picture(&mut self, ui: &mut Ui) {
         let rect = ui.available_rect_before_wrap();
         let response = ui.allocate_rect(rect, Sense::click_and_drag());
         self.mouse(&response, rect);
-        self.advance();
         let Some(session) = &mut self.session else {
             return;
         };
-        // Displayed residuals have to be measured.
-        let measured = match self.style.color_by {
-            ColorBy::Residual if !session.measures() => session.measure(true),
-            _ => Ok(()),
-        };
-        let drawn = measured
-            .and_then(|()| session.color(self.style.color_by))
-            .and_then(|()| self.canvas.show(ui, rect, session, &self.style));
+        session.color(self.style.color_by);
+        // A state is drawn before the simulation leaves with it.
+        let drawn = self.canvas.show(ui, rect, session, &self.style);
         if self.shows_supports {
             supports(ui, rect, session);
         }
-        overlay(ui, rect, session, &self.line, !self.running);
-        self.check(drawn);
+        overlay(ui, rect, session, &self.line);
+        if let Err(error) = drawn {
+            self.fail(&error);
+        }
+        let picks = self.tool != Tool::Orbit && (response.hovered() || self.tool_in_use);
+        self.advance(ui.ctx(), picks);
     }
 
     /// The text of the status line: the result of the last input, else the state and what the tool does.
@@ -454,14 +455,7 @@ impl Viewer {
             self.with_session(|session| session.measure(on));
         }
         if let Some(change) = commands.change {
-            let changed = self
-                .session
-                .as_mut()
-                .map_or(Ok(()), |session| session.change_setting(&change));
-            // The simulation continues with its old settings.
-            if let Err(error) = changed {
-                self.error = Some(ErrorDialog::new("Setting not changed", &error));
-            }
+            self.with_session(|session| session.change_setting(change));
         }
     }
 }
@@ -470,7 +464,10 @@ impl eframe::App for Viewer {
     fn ui(&mut self, ui: &mut Ui, _: &mut eframe::Frame) {
         let context = ui.ctx().clone();
         self.take_files(&context);
-        for action in help::actions(&context) {
+        self.take_results();
+        // A key that is held down does not step faster than the simulation.
+        let repeats = !self.session.as_ref().is_some_and(Session::is_busy);
+        for action in help::actions(&context, repeats) {
             self.act(action);
         }
         let mut commands = UiCommands::default();
@@ -498,11 +495,13 @@ impl eframe::App for Viewer {
         self.windows(&context);
         #[cfg(target_family = "wasm")]
         crate::page::publish(
-            self.session.as_ref().map(Session::report),
+            self.session.as_ref().map(|session| &session.view.report),
             self.error.as_ref().map(|error| error.text.as_str()),
         );
-        let busy = self.loading.is_some() || (self.running && self.session.is_some());
-        if busy {
+        // While the simulation is away, only input changes the picture; its return wakes the window.
+        let session = self.session.as_ref();
+        let waits = self.running && session.is_some_and(Session::can_step);
+        if waits || self.loading.is_some() {
             context.request_repaint();
         }
     }
@@ -545,14 +544,14 @@ fn projected(rect: Rect, session: &Session) -> impl Fn(DVec3) -> Option<Pos2> + 
 
 /// Marks pinned and attached particles on the side of the body that faces the camera.
 fn supports(ui: &Ui, rect: Rect, session: &Session) {
-    let simulation = &session.simulation;
-    let supports = simulation.supports();
+    let view = &session.view;
+    let supports = &view.supports;
     if supports.iter().all(|support| *support == Support::Free) {
         return;
     }
-    let (positions, eye) = (simulation.positions(), session.camera.eye());
+    let (positions, eye) = (&view.positions, session.camera.eye());
     let mut faces_eye = vec![false; positions.len()];
-    for triangle in simulation.boundary() {
+    for triangle in &view.boundary {
         let [a, b, c] = triangle.particles.map(|p| positions[p.index()]);
         if (b - a).cross(c - a).dot(eye - a) > 0.0 {
             for p in triangle.particles {
@@ -579,14 +578,12 @@ fn supports(ui: &Ui, rect: Rect, session: &Session) {
 }
 
 /// Draws the line of the blade, lines that wait to be cut, and the target of the grab.
-fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2], paused: bool) {
+fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2]) {
     let (painter, project) = (ui.painter_at(rect), projected(rect, session));
-    if paused {
-        let dashed = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
-        for waiting in session.waiting_lines() {
-            let points: Vec<Pos2> = waiting.into_iter().filter_map(&project).collect();
-            painter.extend(Shape::dashed_line(&points, dashed, 8.0, 5.0));
-        }
+    let dashed = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
+    for waiting in session.waiting_lines() {
+        let points: Vec<Pos2> = waiting.into_iter().filter_map(&project).collect();
+        painter.extend(Shape::dashed_line(&points, dashed, 8.0, 5.0));
     }
     if session.cuts() && line.len() > 1 {
         let thin = Stroke::new(1.5, Color32::from_rgb(190, 30, 30));
@@ -594,5 +591,156 @@ fn overlay(ui: &Ui, rect: Rect, session: &Session, line: &[Pos2], paused: bool) 
     }
     if let Some(at) = session.grab_target().and_then(project) {
         painter.circle_stroke(at, 7.0, Stroke::new(2.0, Color32::from_rgb(30, 90, 190)));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use eframe::egui::{Event, Key, Modifiers, RawInput, pos2, vec2};
+
+    use super::*;
+    use crate::load::TETS;
+
+    /// A window without a screen or device that shows a block, paused.
+    struct Screen {
+        context: Context,
+        viewer: Viewer,
+    }
+
+    impl Screen {
+        fn new() -> Self {
+            let context = Context::default();
+            let text = "[[body]]\nshape = { kind = \"box\", tets = 600 }\nscale = 0.2\n";
+            let source = Source::from_bytes(Path::new("block.toml"), text.into(), TETS).unwrap();
+            let creation = eframe::CreationContext::_new_kittest(context.clone());
+            let viewer = Viewer::new(&creation, source, Backend::Cpu, TETS, true);
+            let mut screen = Self { context, viewer };
+            while screen.viewer.session.is_none() {
+                screen.frame(Vec::new());
+            }
+            screen
+        }
+
+        fn session(&mut self) -> &mut Session {
+            self.viewer.session.as_mut().unwrap()
+        }
+
+        fn frame(&mut self, events: Vec<Event>) {
+            let input = RawInput {
+                screen_rect: Some(Rect::from_min_size(Pos2::ZERO, vec2(640.0, 400.0))),
+                events,
+                ..RawInput::default()
+            };
+            let mut frame = eframe::Frame::_new_kittest();
+            let viewer = &mut self.viewer;
+            let output = self
+                .context
+                .run_ui(input, |ui| eframe::App::ui(viewer, ui, &mut frame));
+            output.drop_without_applying_deltas();
+        }
+
+        fn key(&mut self, key: Key) {
+            self.frame(vec![Event::Key {
+                key,
+                physical_key: None,
+                pressed: true,
+                repeat: false,
+                modifiers: Modifiers::NONE,
+            }]);
+        }
+
+        fn drag(&mut self, button: PointerButton, from: Pos2, to: Pos2) {
+            let press = |pos, pressed| Event::PointerButton {
+                pos,
+                button,
+                pressed,
+                modifiers: Modifiers::NONE,
+            };
+            self.frame(vec![Event::PointerMoved(from)]);
+            self.frame(vec![press(from, true)]);
+            for i in 1_u8..=10 {
+                let at = from + (to - from) * (f32::from(i) / 10.0);
+                self.frame(vec![Event::PointerMoved(at)]);
+            }
+            self.frame(vec![press(to, false)]);
+        }
+    }
+
+    #[test]
+    fn the_window_responds_while_a_frame_is_computed() {
+        let mut screen = Screen::new();
+        let go = screen.session().send_away();
+        screen.key(Key::Space);
+        let before = screen.session().camera;
+        screen.drag(
+            PointerButton::Secondary,
+            pos2(100.0, 200.0),
+            pos2(180.0, 220.0),
+        );
+        assert_ne!(screen.session().camera, before);
+        screen.session().camera = before;
+        screen.key(Key::W);
+        assert!(screen.viewer.style.wireframe && screen.viewer.running);
+        screen.key(Key::P);
+        assert!(!screen.viewer.has_panel);
+        // A line across the body, which the simulation cuts when it is back.
+        screen.drag(
+            PointerButton::Primary,
+            pos2(325.0, 20.0),
+            pos2(325.0, 360.0),
+        );
+        assert!(screen.session().cuts());
+        assert!(screen.session().simulation().is_none());
+        assert_eq!(screen.session().view.next_frame, 0);
+        go.send(()).unwrap();
+        while screen.session().cuts() || screen.session().view.report.pieces < 2 {
+            screen.frame(Vec::new());
+        }
+        assert!(screen.viewer.error.is_none());
+        // Undo pauses only for strokes of the scene.
+        screen.key(Key::U);
+        while screen.session().view.report.pieces > 1 {
+            screen.frame(Vec::new());
+        }
+        assert!(screen.viewer.running);
+    }
+
+    #[test]
+    fn an_error_of_the_simulation_opens_a_dialog_and_pauses() {
+        let mut screen = Screen::new();
+        let gate = screen.session().send_away();
+        screen.key(Key::Space);
+        // Without its sender the wait fails.
+        drop(gate);
+        while screen.viewer.error.is_none() {
+            screen.frame(Vec::new());
+        }
+        assert!(!screen.viewer.running);
+        screen.key(Key::Escape);
+        assert!(screen.viewer.error.is_none());
+        screen.key(Key::Period);
+        while screen.session().view.next_frame == 0 {
+            screen.frame(Vec::new());
+        }
+    }
+
+    #[test]
+    fn another_body_is_opened_while_a_frame_is_computed() {
+        let mut screen = Screen::new();
+        let go = screen.session().send_away();
+        screen.session().step();
+        let text = "[[body]]\nshape = { kind = \"sphere\", tets = 300 }\n";
+        let source = Source::from_bytes(Path::new("ball.toml"), text.into(), TETS).unwrap();
+        let context = screen.context.clone();
+        screen.viewer.load(&context, source);
+        while screen.session().name != "ball.toml" {
+            screen.frame(Vec::new());
+        }
+        screen.key(Key::Period);
+        while screen.session().view.next_frame == 0 {
+            screen.frame(Vec::new());
+        }
+        // The thread of the first body ends without a receiver.
+        go.send(()).unwrap();
     }
 }

@@ -48,7 +48,12 @@ impl Canvas {
         }
     }
 
-    /// Draws the session into a part of the window.
+    /// True if the canvas draws from positions on the host.
+    pub(crate) fn needs_positions(&self) -> bool {
+        matches!(self, Self::Processor { .. })
+    }
+
+    /// Draws the session into a part of the window. Its simulation may be away unless it has a new state.
     pub(crate) fn show(
         &mut self,
         ui: &egui::Ui,
@@ -57,19 +62,23 @@ impl Canvas {
         style: &Style,
     ) -> anyhow::Result<()> {
         let size = pixels(rect, ui.ctx().pixels_per_point());
+        // Until other colors are there, the old ones stay.
+        let style = &Style {
+            color_by: session.view.shown,
+            ..*style
+        };
         let texture = match self {
             Self::Device {
                 state,
                 renderer,
                 shown,
             } => {
-                let view = renderer.draw(
-                    &session.render_scene,
-                    &session.simulation,
-                    &session.camera,
-                    style,
-                    size,
-                )?;
+                let is_new = session.take_new();
+                let (scene, camera) = (&session.view.render_scene, &session.camera);
+                let view = match session.simulation().filter(|_| is_new) {
+                    Some(simulation) => renderer.draw(scene, simulation, camera, style, size)?,
+                    None => renderer.redraw(scene, camera, style, size)?,
+                };
                 let mut known = state.renderer.write();
                 let nearest = wgpu::FilterMode::Nearest;
                 match *shown {
@@ -89,10 +98,9 @@ impl Canvas {
                 }
             }
             Self::Processor { texture } => {
-                session.simulation.read_back()?;
                 let picture = software_picture(
-                    &session.render_scene,
-                    &session.simulation,
+                    &session.view.render_scene,
+                    &session.view.positions,
                     &session.camera,
                     style,
                     size,

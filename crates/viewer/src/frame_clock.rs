@@ -1,14 +1,12 @@
 //! [`FrameClock`]: the number of simulation frames in a frame of the window.
 //!
-//! Simulated time keeps up with real time. If the simulation is too slow, time beyond [`PATIENCE`] is dropped, so that
-//! the window stays responsive; the panel shows the speed that is reached.
-
-use std::time::Duration;
+//! Simulated time keeps up with real time. If the simulation is too slow, time beyond [`PATIENCE_MS`] is dropped, so that
+//! pictures keep coming; the panel shows the speed that is reached.
 
 use web_time::Instant;
 
-/// Longest simulation time between two pictures.
-const PATIENCE: Duration = Duration::from_millis(40);
+/// Longest time in ms to simulate between two pictures, unless one frame takes longer.
+const PATIENCE_MS: f64 = 40.0;
 
 /// Weight of the newest frame in the mean speed.
 const NEWEST: f64 = 0.05;
@@ -42,30 +40,33 @@ impl FrameClock {
         (self.last, self.due) = (None, 0.0);
     }
 
-    /// Calls `step` for each frame of `time_step` seconds that has passed, until it returns false.
-    pub(crate) fn run(&mut self, now: Instant, time_step: f64, mut step: impl FnMut() -> bool) {
+    /// Number of frames of `time_step` seconds that are due and will be made at once; a frame takes `frame_ms`.
+    pub(crate) fn take_due(&mut self, now: Instant, time_step: f64, frame_ms: f64) -> usize {
         let passed = self.last.map(|last| (now - last).as_secs_f64());
         self.last = Some(now);
         let Some(passed) = passed else {
-            step();
-            return;
+            return 1;
         };
         self.due += passed * self.speed;
-        let mut done = 0.0;
-        while self.due >= time_step {
-            if now.elapsed() > PATIENCE {
-                self.due = 0.0;
-                break;
-            }
-            self.due -= time_step;
-            done += time_step;
-            if !step() {
-                break;
-            }
-        }
+        let due = (self.due / time_step).floor();
+        let most = (PATIENCE_MS / frame_ms).floor().max(1.0);
+        let frames = due.min(most);
+        let simulated = frames * time_step;
+        self.due = if due > most {
+            0.0
+        } else {
+            self.due - simulated
+        };
         if passed > 0.0 {
-            self.reached += NEWEST * (done / passed - self.reached);
+            self.reached += NEWEST * (simulated / passed - self.reached);
         }
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a whole number, bounded by the frames that fit"
+        )]
+        let frames = frames as usize;
+        frames
     }
 
     /// Recent mean of simulated time over real time.
@@ -76,20 +77,15 @@ impl FrameClock {
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use super::*;
 
     #[test]
     fn frames_follow_the_clock() {
         let (mut clock, start) = (FrameClock::default(), Instant::now());
-        let mut frames = 0;
-        for tick in 0..=50 {
-            // In the future, so that the limit of simulation time is never reached.
-            let now = start + Duration::from_secs(1000) + Duration::from_millis(20 * tick);
-            clock.run(now, 0.005, || {
-                frames += 1;
-                true
-            });
-        }
+        let tick = |tick: u64| start + Duration::from_millis(20 * tick);
+        let frames: usize = (0..=50).map(|i| clock.take_due(tick(i), 0.005, 1.0)).sum();
         // The first tick has no predecessor and runs one frame; later ones run a second's worth, up to rounding.
         assert!((200..=201).contains(&frames), "{frames}");
     }
@@ -97,29 +93,16 @@ mod tests {
     #[test]
     fn excess_time_is_dropped() {
         let (mut clock, start) = (FrameClock::default(), Instant::now());
-        let past = start - Duration::from_millis(500);
-        clock.run(past, 0.01, || true);
-        let mut frames = 0;
-        // Half a second is due, but the limit of simulation time is reached.
-        clock.run(past + Duration::from_millis(300), 0.01, || {
-            frames += 1;
-            true
-        });
-        assert_eq!((frames, clock.due), (0, 0.0));
-    }
-
-    #[test]
-    fn a_failed_frame_stops_the_clock() {
-        let (mut clock, start) = (
-            FrameClock::default(),
-            Instant::now() + Duration::from_secs(1000),
-        );
-        clock.run(start, 0.01, || true);
-        let mut frames = 0;
-        clock.run(start + Duration::from_secs(1), 0.01, || {
-            frames += 1;
-            frames < 3
-        });
-        assert_eq!(frames, 3);
+        let ms = |ms| start + Duration::from_millis(ms);
+        // The time of the first frame is not known before.
+        assert_eq!(clock.take_due(start, 0.01, 0.0), 1);
+        // Half a second is due: four frames fit, or one if it takes long.
+        assert_eq!(clock.take_due(ms(500), 0.01, 10.0), 4);
+        assert_eq!(clock.due, 0.0);
+        assert_eq!(clock.take_due(ms(1000), 0.01, 200.0), 1);
+        assert_eq!(clock.take_due(ms(1005), 0.01, 200.0), 0);
+        assert!(clock.due > 0.0);
+        clock.pause();
+        assert_eq!(clock.due, 0.0);
     }
 }

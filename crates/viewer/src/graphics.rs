@@ -1,7 +1,7 @@
 //! The window's device: one for drawing and, if it can, for simulating.
 //!
 //! An adapter with the limits that the kernels need gets a device that solver and renderer share, so that results are
-//! drawn without a copy. A less capable one (OpenGL of an old driver) only shows the window: the CPU then simulates and
+//! drawn without leaving it. A less capable one (OpenGL of an old driver) only shows the window: the CPU then simulates and
 //! draws, and the panel shows a note.
 
 use std::sync::Arc;

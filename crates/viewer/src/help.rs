@@ -146,8 +146,9 @@ const MOUSE: [(&str, &str); 7] = [
     ("Drop a file", "Open a scene, mesh or surface"),
 ];
 
-/// Actions of the keys pressed since the last frame; none while a text field has the keyboard.
-pub(crate) fn actions(context: &Context) -> Vec<Action> {
+/// Actions of the keys pressed since the last frame; none while a text field has the keyboard. `repeats` is true if keys
+/// that are held down may repeat their actions.
+pub(crate) fn actions(context: &Context, repeats: bool) -> Vec<Action> {
     if context.egui_wants_keyboard_input() {
         return Vec::new();
     }
@@ -159,7 +160,7 @@ pub(crate) fn actions(context: &Context) -> Vec<Action> {
                 repeat,
                 modifiers,
                 ..
-            } => action(*key, *modifiers, *repeat),
+            } if repeats || !repeat => action(*key, *modifiers, *repeat),
             _ => None,
         });
         actions.collect()

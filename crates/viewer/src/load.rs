@@ -12,9 +12,11 @@ use incise::gpu::GpuContext;
 use incise::mesh::glam::DVec3;
 use incise::meshing::Solid;
 use incise::scene::{Backend, GroundSpec, location};
-use incise::{Body, Scene, Simulation, SimulationBuilder};
+use incise::{Body, Scene, SimulationBuilder};
 use incise::{mesh_io, meshing};
 use web_time::Instant;
+
+use crate::session::Session;
 
 /// Default number of tets to fill a surface with.
 pub(crate) const TETS: u32 = 11_000;
@@ -170,20 +172,12 @@ fn scene_around(source: &MeshSource) -> anyhow::Result<(Scene, SimulationBuilder
     Ok((scene, builder))
 }
 
-/// A loaded simulation.
-#[derive(Debug)]
-pub(crate) struct Loaded {
-    pub(crate) name: String,
-    pub(crate) scene: Scene,
-    pub(crate) simulation: Simulation,
-}
-
 /// A simulation that is being loaded.
 #[derive(Debug)]
 pub(crate) struct Loading {
     pub(crate) name: String,
     pub(crate) since: Instant,
-    receiver: Receiver<anyhow::Result<Loaded>>,
+    receiver: Receiver<anyhow::Result<Session>>,
 }
 
 impl Loading {
@@ -241,8 +235,8 @@ impl Loading {
         }
     }
 
-    /// The loaded simulation or the error, once the thread has ended.
-    pub(crate) fn poll(&self) -> Option<anyhow::Result<Loaded>> {
+    /// The loaded session or the error, once the thread has ended.
+    pub(crate) fn poll(&self) -> Option<anyhow::Result<Session>> {
         match self.receiver.try_recv() {
             Ok(result) => Some(result),
             Err(TryRecvError::Empty) => None,
@@ -251,8 +245,16 @@ impl Loading {
     }
 }
 
-fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyhow::Result<Loaded> {
-    let (mut scene, builder) = source.open()?;
+fn load(
+    source: &Source,
+    backend: Backend,
+    gpu: Option<Arc<GpuContext>>,
+) -> anyhow::Result<Session> {
+    let (mut scene, mut builder) = source.open()?;
+    // Threads of its own: the window draws on those of the global pool while the simulation steps.
+    if !cfg!(target_family = "wasm") {
+        builder.threads(std::thread::available_parallelism().map_or(1, usize::from));
+    }
     let mut simulation = builder.build().map_err(|error| source.locate(error))?;
     if let Some(gpu) = gpu {
         simulation.offer_device(gpu);
@@ -262,11 +264,7 @@ fn load(source: &Source, backend: Backend, gpu: Option<Arc<GpuContext>>) -> anyh
             set.map_err(|error| source.locate(error))?;
         }
     }
-    Ok(Loaded {
-        name: source.name(),
-        scene,
-        simulation,
-    })
+    Session::new(source.name(), &scene, simulation)
 }
 
 #[cfg(test)]
@@ -282,7 +280,7 @@ mod tests {
         let mesh = kuhn_box([4, 2, 6], DVec3::new(40.0, 20.0, 60.0));
         mesh_io::write(&path, &mesh).unwrap();
         let loaded = load(&Source::new(Some(&path), TETS).unwrap(), Backend::Cpu, None).unwrap();
-        let positions = loaded.simulation.positions();
+        let positions = &loaded.view.positions;
         let high = positions.iter().fold(DVec3::NEG_INFINITY, |a, b| a.max(*b));
         let low = positions.iter().fold(DVec3::INFINITY, |a, b| a.min(*b));
         // The solver's positions are in single precision.
@@ -303,14 +301,14 @@ mod tests {
         );
         mesh_io::write(&a, &mesh).unwrap();
         mesh_io::write_surface(&b, &surface).unwrap();
-        std::fs::write(&c, "[[body]]\nshape = { kind = \"box\", tets = 10 }\n").unwrap();
+        std::fs::write(&c, "[[body]]\nshape = { kind = \"box\", tets = 300 }\n").unwrap();
         for path in [a, b, c] {
             let bytes = std::fs::read(&path).unwrap();
             let on_disk = Source::new(Some(&path), 500).unwrap();
             let in_memory = Source::from_bytes(&path, bytes, 500).unwrap();
             let [left, right] = [on_disk, in_memory].map(|source| {
                 let loaded = load(&source, Backend::Cpu, None).unwrap();
-                (loaded.name, loaded.simulation.positions().to_vec())
+                (loaded.name, loaded.view.positions)
             });
             assert_eq!(left, right);
         }
@@ -323,7 +321,7 @@ mod tests {
         let mesh = kuhn_box([2; 3], DVec3::ONE);
         mesh_io::write_surface(&path, &TriangleSurface::boundary_of(&mesh)).unwrap();
         let loaded = load(&Source::new(Some(&path), 2000).unwrap(), Backend::Cpu, None).unwrap();
-        let tets = loaded.simulation.mesh().tets.len();
+        let tets = loaded.view.report.tets;
         assert!((1000..4000).contains(&tets), "{tets}");
     }
 

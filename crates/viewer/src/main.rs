@@ -24,6 +24,7 @@ mod times;
 mod tool;
 #[cfg(target_family = "wasm")]
 mod web;
+mod worker;
 
 #[cfg(not(target_family = "wasm"))]
 fn main() -> std::process::ExitCode {

@@ -1,11 +1,17 @@
 //! The viewer as a program with a window: its arguments and exit codes.
 
+use std::cell::OnceCell;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::rc::Rc;
+use std::sync::Weak;
+use std::thread::sleep;
+use std::time::Duration;
 
 use anyhow::anyhow;
 use clap::{Parser, ValueEnum};
 use eframe::egui;
+use incise::gpu::GpuContext;
 
 use crate::app::Viewer;
 use crate::load::Source;
@@ -92,16 +98,23 @@ fn open(source: Source, arguments: &Arguments) -> anyhow::Result<()> {
         ..eframe::NativeOptions::default()
     };
     let (backend, tets, paused) = (arguments.backend.into(), arguments.tets, arguments.paused);
-    eframe::run_native(
+    let device: Rc<OnceCell<Weak<GpuContext>>> = Rc::default();
+    let used = Rc::clone(&device);
+    let shown = eframe::run_native(
         "incise",
         options,
         Box::new(move |creation| {
-            Ok(Box::new(Viewer::new(
-                creation, source, backend, tets, paused,
-            )))
+            let viewer = Viewer::new(creation, source, backend, tets, paused);
+            // Set once: this function is called once.
+            let _ = used.set(viewer.device());
+            Ok(Box::new(viewer))
         }),
-    )
-    .map_err(|error| anyhow!("{}", why_no_window(&error)))
+    );
+    // Drivers crash if the process ends while another thread calls them: wait for frames that are computed on the device.
+    while device.get().is_some_and(|it| Weak::strong_count(it) > 0) {
+        sleep(Duration::from_millis(10));
+    }
+    shown.map_err(|error| anyhow!("{}", why_no_window(&error)))
 }
 
 /// The message shown if no window can be opened.

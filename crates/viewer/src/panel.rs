@@ -64,14 +64,14 @@ pub(crate) fn show(
             look(ui, session, controls);
             ui.separator();
             counts(ui, session, controls, &mut commands);
-            session.times.show(ui);
+            session.view.times.show(ui);
             ui.separator();
             ui.strong("Speed and accuracy");
-            let on_gpu = session.simulation.device_solvers().next().is_some();
+            let on_gpu = session.view.on_device;
             commands.change = settings::show(ui, session.solver(), controls.has_gpu, on_gpu);
             effects(ui, session);
             ui.separator();
-            note = session.simulation.backend_note();
+            note = session.view.backend_note.as_deref();
         }
         for note in controls.notes.iter().map(String::as_str).chain(note) {
             ui.label(note);
@@ -87,7 +87,7 @@ fn buttons(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>, commands
             (pause, Action::Pause, true),
             ("Step", Action::Step, !controls.running),
             ("Reset", Action::Reset, true),
-            ("Undo", Action::Undo, session.undo_points() > 0),
+            ("Undo", Action::Undo, session.view.undo_points > 0),
             ("Fit", Action::Fit, true),
             ("Help", Action::Help, true),
         ] {
@@ -173,7 +173,7 @@ fn look(ui: &mut Ui, session: &Session, controls: &mut Controls<'_>) {
         controls.shows_supports,
         "Mark pinned and attached particles",
     );
-    if let Some(legend) = &session.legend {
+    if let Some(legend) = &session.view.legend {
         bar(ui, legend);
     } else if style.color_by == ColorBy::Residual {
         ui.label(RichText::new("No residuals of tets yet (VBD has none)").small());
@@ -221,8 +221,8 @@ fn number(value: f64) -> String {
     }
 }
 
-fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands: &mut UiCommands) {
-    let report = session.report();
+fn counts(ui: &mut Ui, session: &Session, controls: &Controls<'_>, commands: &mut UiCommands) {
+    let report = &session.view.report;
     let mut rows = vec![
         (
             "Frame",
@@ -237,7 +237,7 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
             "Frame time",
             format!(
                 "{:.1} ms (budget {:.0} ms)",
-                session.frame_ms,
+                session.view.frame_ms,
                 1e3 * session.solver().time_step,
             ),
         ),
@@ -246,7 +246,7 @@ fn counts(ui: &mut Ui, session: &mut Session, controls: &Controls<'_>, commands:
             format!("{:.2}x real time", controls.clock.reached()),
         ),
     ];
-    let measured = session.measured.as_ref();
+    let measured = session.view.measured.as_ref();
     if let Some(residual) = measured.and_then(|report| report.residual) {
         let force = residual.force_relative.map_or_else(
             || format!("{} N", number(residual.force)),
@@ -305,7 +305,7 @@ fn files(ui: &mut Ui, controls: &mut Controls<'_>, commands: &mut UiCommands) {
 }
 
 fn effects(ui: &mut Ui, session: &Session) {
-    for effect in session.effects.changes() {
+    for effect in session.view.effects.changes() {
         ui.label(RichText::new(&effect.what).strong());
         let mut text = effect.time();
         let residual = effect.residual();

@@ -41,7 +41,7 @@ pub(crate) struct Effect {
 }
 
 /// Effects of the last changes.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct SettingEffects {
     /// Frames since the last change, at most [`FRAMES`].
     recent: VecDeque<Sample>,

@@ -30,7 +30,7 @@ const STAGES: [(&str, Color32, Stage); 9] = [
 ];
 
 /// Stage times of the last frames.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Times {
     frames: VecDeque<(u64, Milliseconds)>,
 }

@@ -19,7 +19,7 @@ use crate::island::Island;
 use crate::island_builder::IslandBuilder;
 use crate::merged_mesh::MergedMesh;
 use crate::method::settings;
-use crate::ray::{RayHit, first_hit};
+use crate::ray::RayHit;
 use crate::resolved_body::ResolvedBody;
 use crate::scene::{AttachmentSpec, ColliderSpec, ContactPairs, ContactSpec, DistanceSpec};
 use crate::validate::{LARGEST_COORDINATE, coordinates, value, within};
@@ -598,7 +598,7 @@ impl Simulation {
     /// ```
     #[must_use]
     pub fn ray_cast(&self, origin: DVec3, direction: DVec3) -> Option<RayHit> {
-        first_hit(self.boundary(), self.positions(), origin, direction)
+        RayHit::first(self.boundary(), self.positions(), origin, direction)
     }
 }
 

@@ -1,9 +1,9 @@
 //! [`GpuRenderer`]: images drawn by a device.
 //!
-//! Vertex positions are not uploaded: the vertex shader reads the solver's position buffer and looks up the triangle
-//! and its corners; normals are computed on the device. Triangles and colors of the whole skin are uploaded when any of
-//! them changed, view and obstacles for each image. Positions of several solvers are concatenated by copies on the
-//! device. A simulation on the processor uploads its positions. All commands go in one submit; only an [`Image`] is
+//! Vertex positions are not uploaded: they are copied from the buffers of the solvers, on the device; the vertex shader
+//! looks up the triangle and its corners, and normals are computed on the device. Triangles and colors of the whole skin
+//! are uploaded when any of them changed, view and obstacles for each image. A simulation on the processor uploads its
+//! positions. The copy can be drawn again while the simulation steps on another thread. All commands go in one submit; only an [`Image`] is
 //! read back.
 //!
 //! Cost: one thread per triangle for the normals, four samples per pixel.
@@ -117,8 +117,8 @@ impl GpuRenderer {
     /// texture stays the same until the size changes and holds stored colors (`Rgba8Unorm`) for sampling. Returns when
     /// the commands are submitted.
     ///
-    /// A simulation on this device is drawn from its own buffer after its first step since the render scene was created
-    /// or reset. Otherwise the host's positions are uploaded: see [`GpuRenderer::needs_read_back`].
+    /// The positions of a simulation on this device are copied there after its first step since the render scene was
+    /// created or reset. Otherwise the host's positions are uploaded: see [`GpuRenderer::needs_read_back`].
     ///
     /// # Errors
     /// If a side of the image is 0 or more than the device allows; if the device is lost or out of memory.
@@ -133,6 +133,41 @@ impl GpuRenderer {
         style: &Style,
         size: [u32; 2],
     ) -> Result<&wgpu::TextureView, RenderError> {
+        let solvers = if render_scene.device_is_current() {
+            solvers_here(&self.gpu, simulation)
+        } else {
+            Vec::new()
+        };
+        self.gpu.check()?;
+        self.upload
+            .send_bodies(&self.gpu, render_scene, simulation, &solvers)?;
+        self.show(render_scene, &solvers, camera, style, size)
+    }
+
+    /// Draws the positions of the last [`GpuRenderer::draw`] again, with another camera or style, without the simulation:
+    /// it may be busy on another thread.
+    ///
+    /// # Errors
+    /// Returns the errors of [`GpuRenderer::draw`].
+    pub fn redraw(
+        &mut self,
+        render_scene: &RenderScene,
+        camera: &Camera,
+        style: &Style,
+        size: [u32; 2],
+    ) -> Result<&wgpu::TextureView, RenderError> {
+        self.show(render_scene, &[], camera, style, size)
+    }
+
+    /// Draws the uploaded skin at the positions of solvers, or at the last ones.
+    fn show(
+        &mut self,
+        render_scene: &RenderScene,
+        solvers: &[&GpuSolver],
+        camera: &Camera,
+        style: &Style,
+        size: [u32; 2],
+    ) -> Result<&wgpu::TextureView, RenderError> {
         let largest = self.gpu.device().limits().max_texture_dimension_2d;
         let view = View::new(camera, size, largest)?;
         self.gpu.check()?;
@@ -140,14 +175,9 @@ impl GpuRenderer {
             Some(target) if target.size == size => target,
             _ => Target::new(&self.gpu, size)?,
         };
-        let solvers = if render_scene.device_is_current() {
-            solvers_here(&self.gpu, simulation)
-        } else {
-            Vec::new()
-        };
         self.upload
-            .send(&self.gpu, render_scene, simulation, &solvers, style, &view)?;
-        self.record(&target, &solvers);
+            .send_view(&self.gpu, render_scene, style, &view)?;
+        self.record(&target, solvers);
         self.gpu.check()?;
         Ok(&self.target.insert(target).shown)
     }
@@ -156,7 +186,8 @@ impl GpuRenderer {
     fn record(&self, target: &Target, solvers: &[&GpuSolver]) {
         let (gpu, upload) = (&*self.gpu, &self.upload);
         let mut encoder = gpu.device().create_command_encoder(&Default::default());
-        let positions = upload.gather(&mut encoder, solvers);
+        upload.gather(&mut encoder, solvers);
+        let positions = upload.positions.raw();
         self.compute_normals(&mut encoder, positions);
         if upload.has_ground {
             self.draw_contact_shadow(&mut encoder, positions);

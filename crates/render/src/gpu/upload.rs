@@ -1,8 +1,8 @@
 //! [`Upload`]: device copies of the data to draw, uploaded only when they changed.
 //!
 //! After a cut or a reset the whole skin and all its colors are uploaded again: O(triangles), even for a small cut.
-//! Positions are read from the solvers on this device or else uploaded each time: 16 bytes per particle. View, planes
-//! and the triangles of obstacles and blades are uploaded for each image.
+//! Positions are copied from the solvers on this device or else uploaded: 16 bytes per particle. View, planes and the
+//! triangles of obstacles and blades are uploaded for each image.
 
 use std::sync::Arc;
 
@@ -55,6 +55,8 @@ pub(super) struct Upload {
     /// Revision of the uploaded skin, and whether its particles are numbered as in the device's solvers.
     skin: (u64, bool),
     coloring: u64,
+    /// Origins of the solvers, or of the uploaded positions.
+    origins: Vec<DVec3>,
     /// True if there is a ground.
     pub(super) has_ground: bool,
     pub(super) view: Buffer<ViewNumbers>,
@@ -76,6 +78,7 @@ impl Upload {
         Ok(Self {
             skin: NOTHING,
             coloring: 0,
+            origins: Vec::new(),
             has_ground: false,
             view: Buffer::new(gpu, "view", uniform)?,
             positions: Buffer::new(gpu, "positions to draw", storage)?,
@@ -99,15 +102,14 @@ impl Upload {
         bodies + self.view.sent() + self.props.sent() + planes
     }
 
-    /// Uploads what has changed. `solvers` are the position sources; empty if positions are to be uploaded.
-    pub(super) fn send(
+    /// Uploads the skin if it has changed, and positions. `solvers` are the position sources; empty if positions are to
+    /// be uploaded.
+    pub(super) fn send_bodies(
         &mut self,
         gpu: &GpuContext,
         render_scene: &RenderScene,
         simulation: &Simulation,
         solvers: &[&GpuSolver],
-        style: &Style,
-        view: &View,
     ) -> Result<(), RenderError> {
         let skin = (render_scene.topology(), !solvers.is_empty());
         // The key is set only after the upload succeeded.
@@ -116,7 +118,20 @@ impl Upload {
             self.send_skin(gpu, render_scene, simulation, solvers)?;
             self.skin = skin;
         }
-        self.send_positions(gpu, simulation, solvers, view)?;
+        self.send_positions(gpu, simulation, solvers)
+    }
+
+    /// Uploads what depends on the view, and colors if they have changed.
+    pub(super) fn send_view(
+        &mut self,
+        gpu: &GpuContext,
+        render_scene: &RenderScene,
+        style: &Style,
+        view: &View,
+    ) -> Result<(), RenderError> {
+        let part = |origin: &DVec3| view.relative(*origin).extend(0.0).to_array();
+        let parts: Vec<_> = self.origins.iter().map(part).collect();
+        self.parts.replace(gpu, &parts)?;
         let colors = render_scene.colors_for(style.color_by);
         if !colors.is_empty() && self.coloring != render_scene.coloring() {
             self.coloring = 0;
@@ -128,7 +143,7 @@ impl Upload {
             | u32::from(!colors.is_empty()) << 2;
         self.view.replace(gpu, &[view_numbers(view, flags)])?;
 
-        let props = Props::new(render_scene, simulation, view);
+        let props = Props::new(render_scene, view);
         self.props.replace(gpu, &props.corners)?;
         let planes: Vec<_> = props.planes.iter().map(plane_numbers).collect();
         self.planes.replace(gpu, &planes)?;
@@ -174,15 +189,14 @@ impl Upload {
         Ok(())
     }
 
-    /// Uploads the origins of parts, and positions unless they are on the device.
+    /// Uploads positions, or makes room for those of the solvers.
     fn send_positions(
         &mut self,
         gpu: &GpuContext,
         simulation: &Simulation,
         solvers: &[&GpuSolver],
-        view: &View,
     ) -> Result<(), RenderError> {
-        let part = |origin: DVec3| view.relative(origin).extend(0.0).to_array();
+        self.origins.clear();
         if solvers.is_empty() {
             let positions = simulation.positions();
             // An origin near the bodies: single precision does not suffice far from the world origin.
@@ -190,36 +204,23 @@ impl Upload {
             let local = |x: &DVec3| (*x - origin).as_vec3().extend(0.0).to_array();
             let local: Vec<[f32; 4]> = positions.iter().map(local).collect();
             self.positions.replace(gpu, &local)?;
-            self.parts.replace(gpu, &[part(origin)])?;
+            self.origins.push(origin);
             return Ok(());
         }
-        let origins = solvers.iter().map(|solver| solver.cached_host().origin());
-        let parts: Vec<_> = origins.map(part).collect();
-        self.parts.replace(gpu, &parts)?;
-        if solvers.len() > 1 {
-            let particles = solvers.iter();
-            let particles = particles.map(|solver| solver.cached_host().particle_count());
-            self.positions.resize(gpu, particles.sum())?;
-        }
-        Ok(())
+        let hosts = || solvers.iter().map(|solver| solver.cached_host());
+        self.origins.extend(hosts().map(|host| host.origin()));
+        let particles = hosts().map(|host| host.particle_count()).sum();
+        Ok(self.positions.resize(gpu, particles)?)
     }
 
-    /// Concatenates the positions of several solvers; a single solver's buffer is used directly.
-    pub(super) fn gather<'b>(
-        &'b self,
-        encoder: &mut wgpu::CommandEncoder,
-        solvers: &[&'b GpuSolver],
-    ) -> &'b wgpu::Buffer {
-        if let [only] = solvers {
-            return only.positions();
-        }
+    /// Copies the positions of solvers one after another. They stay for the next image, whatever the solvers do.
+    pub(super) fn gather(&self, encoder: &mut wgpu::CommandEncoder, solvers: &[&GpuSolver]) {
         let mut offset = 0;
         for solver in solvers {
             let (from, bytes) = (solver.positions(), bytes_of(solver));
             encoder.copy_buffer_to_buffer(from, 0, self.positions.raw(), offset, bytes);
             offset += bytes;
         }
-        self.positions.raw()
     }
 }
 

@@ -22,7 +22,7 @@ fn assert_alike(renderer: &mut GpuRenderer, shown: &Shown, style: &Style, what: 
     let there = renderer
         .picture(render_scene, simulation, &camera, style, SIZE)
         .unwrap();
-    let here = software_picture(render_scene, simulation, &camera, style, SIZE);
+    let here = software_picture(render_scene, simulation.positions(), &camera, style, SIZE);
     let difference = Difference::of(&there, &here.unwrap(), 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -68,7 +68,14 @@ fn assert_present(
     what: &str,
 ) {
     simulation.read_back().unwrap();
-    let here = software_picture(render_scene, simulation, camera, &Style::default(), SIZE).unwrap();
+    let here = software_picture(
+        render_scene,
+        simulation.positions(),
+        camera,
+        &Style::default(),
+        SIZE,
+    )
+    .unwrap();
     let difference = Difference::of(there, &here, 24);
     assert!(
         difference.mean < 1.0 && difference.share < 0.04,
@@ -129,7 +136,8 @@ fn positions_do_not_leave_the_device() {
         .picture(&render_scene, &simulation, &camera, &style, SIZE)
         .unwrap();
     // The host does not know yet how far it fell.
-    let old = software_picture(&render_scene, &simulation, &camera, &style, SIZE).unwrap();
+    let old =
+        software_picture(&render_scene, simulation.positions(), &camera, &style, SIZE).unwrap();
     let difference = Difference::of(&there, &old, 24);
     assert!(difference.mean > 1.0, "{difference:?}");
     assert_present(
@@ -314,4 +322,43 @@ fn sizes_that_are_no_pictures_are_refused() {
         assert_eq!(draw(size).unwrap(), 4 * size[0] as usize * size[1] as usize);
     }
     assert!(gpu.check().is_ok(), "nothing was refused by the driver");
+}
+
+/// Normals depend on the positions and not on the view.
+#[test]
+fn the_last_state_is_drawn_again_while_the_simulation_goes_on() {
+    let Some(gpu) = gpu("the_last_state_is_drawn_again_while_the_simulation_goes_on") else {
+        return;
+    };
+    let scene = Scene::from_toml(LIVER).unwrap();
+    let on_device = Simulation::on_device(&scene, Arc::clone(&gpu)).unwrap();
+    for mut simulation in [on_device, Simulation::new(&scene).unwrap()] {
+        let mut render_scene = RenderScene::new(&simulation, &scene);
+        let mut renderer = GpuRenderer::new(Arc::clone(&gpu)).unwrap();
+        let mut camera = Camera::fit(Vec3::splat(-0.22).into(), Vec3::splat(0.2).into());
+        let style = Style::default();
+        simulation.step().unwrap();
+        render_scene.sync(&simulation);
+        renderer
+            .draw(&render_scene, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        let before = renderer.read_normal_sums().unwrap();
+        for _ in 0..5 {
+            simulation.step().unwrap();
+            camera.orbit(0.1, 0.0);
+            let sent = renderer.uploaded_bytes();
+            renderer
+                .redraw(&render_scene, &camera, &style, SIZE)
+                .unwrap();
+            let sent = renderer.uploaded_bytes() - sent;
+            assert!(sent < 16 * simulation.positions().len() as u64, "{sent}");
+            assert_eq!(renderer.read_normal_sums().unwrap(), before);
+        }
+        render_scene.reset(&simulation);
+        simulation.read_back().unwrap();
+        renderer
+            .draw(&render_scene, &simulation, &camera, &style, SIZE)
+            .unwrap();
+        assert_ne!(renderer.read_normal_sums().unwrap(), before);
+    }
 }

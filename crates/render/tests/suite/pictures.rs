@@ -6,7 +6,8 @@ use incise_render::{Camera, ColorBy, Image, RenderError, Style, software_picture
 use crate::support::{LIVER, Shown, TWO_BODIES};
 
 fn draw(shown: &Shown, camera: &Camera, style: &Style, size: [u32; 2]) -> Image {
-    software_picture(&shown.render_scene, &shown.simulation, camera, style, size).unwrap()
+    let positions = shown.simulation.positions();
+    software_picture(&shown.render_scene, positions, camera, style, size).unwrap()
 }
 
 /// Numbers of pixels of what is red, by connected regions, the largest first; below ten pixels nothing counts.
@@ -64,7 +65,7 @@ fn sizes_that_are_no_pictures_are_refused() {
     for size in [[0, 1], [1, 0], [0, 0], [8193, 1], [1, u32::MAX]] {
         let picture = software_picture(
             &shown.render_scene,
-            &shown.simulation,
+            shown.simulation.positions(),
             &camera,
             &Style::default(),
             size,

@@ -75,7 +75,7 @@ fn software_draws_the_references() {
             style,
         } = reference;
         let (render_scene, simulation) = (&shown.render_scene, &shown.simulation);
-        let drawn = software_picture(render_scene, simulation, &camera, &style, SIZE);
+        let drawn = software_picture(render_scene, simulation.positions(), &camera, &style, SIZE);
         let drawn = drawn.unwrap();
         if std::env::var_os("INCISE_BLESS").is_some() {
             drawn.write_png(path(name)).unwrap();

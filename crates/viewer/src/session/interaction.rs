@@ -1,14 +1,16 @@
 //! Interaction with a [`Session`]: cutting along drawn lines, and pulling with the pointer.
 //!
 //! The blade takes one pose a frame, line after line. Poses of a line that is drawn faster, or while the simulation is
-//! paused, wait in a queue. Waiting poses on a straight line are merged into one, which keeps the queue short.
+//! paused or away, wait in a queue. Waiting poses on a straight line are merged into one, which keeps the queue short. Of
+//! the targets of a grab the last one counts. Rays hit the body where the view shows it.
 
 use std::collections::VecDeque;
 
+use incise::RayHit;
 use incise::mesh::glam::DVec3;
 
-use super::{ActiveGrab, Session};
-use crate::history::UndoPoint;
+use super::Session;
+use super::engine::{BladeMotion, Command};
 use crate::tool::blade;
 
 /// Largest distance from a straight line, in points of the window, of poses that are merged.
@@ -34,10 +36,15 @@ pub(super) struct Line {
     surface: Option<f64>,
     /// True if the button is up: the line ends with its last pose.
     is_finished: bool,
-    /// Number of the stroke, once it has begun.
-    pub(super) stroke: Option<u32>,
-    /// The undo point before the stroke, until it has cut something.
-    before: Option<UndoPoint>,
+}
+
+/// A grab that follows the pointer.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pull {
+    /// Depth of the target along the camera's direction in m.
+    depth: f64,
+    /// Target of the grab.
+    pub(super) to: DVec3,
 }
 
 impl Line {
@@ -87,42 +94,41 @@ fn distance_to_segment(point: [f64; 2], from: [f64; 2], to: [f64; 2]) -> f64 {
 
 impl Session {
     /// Starts a line at a pixel of a picture of some size.
-    pub(crate) fn press_blade(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<()> {
+    pub(crate) fn press_blade(&mut self, pixel: [f64; 2], size: [f64; 2]) {
         self.lift_blade();
-        let surface = self.surface_at(pixel, size)?;
+        self.message = None;
+        let surface = self.hit(pixel, size).map(|hit| hit.distance);
         let ends = self.blade_under(pixel, size, surface);
         self.lines.push_back(Line {
             waiting: VecDeque::from([BladePose { pixel, ends }]),
             last_cut: None,
             surface,
             is_finished: false,
-            stroke: None,
-            before: None,
         });
-        self.render_scene.set_blade(Some(&ends));
-        Ok(())
+        self.blade = Some(ends);
+        self.show_blade();
     }
 
     /// Continues the line to a pixel; does nothing if none is being drawn.
-    pub(crate) fn draw_blade(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<()> {
+    pub(crate) fn draw_blade(&mut self, pixel: [f64; 2], size: [f64; 2]) {
         let Some(line) = self.lines.back().filter(|line| !line.is_finished) else {
-            return Ok(());
+            return;
         };
         if line
             .last()
             .is_some_and(|last| distance(last, pixel) < STILL)
         {
-            return Ok(());
+            return;
         }
         let before = line.surface;
-        let surface = self.surface_at(pixel, size)?.or(before);
+        let surface = self.hit(pixel, size).map(|hit| hit.distance).or(before);
         let ends = self.blade_under(pixel, size, surface);
         if let Some(line) = self.lines.back_mut() {
             line.surface = surface;
             line.push(BladePose { pixel, ends });
         }
-        self.render_scene.set_blade(Some(&ends));
-        Ok(())
+        self.blade = Some(ends);
+        self.show_blade();
     }
 
     /// Ends the line that is being drawn.
@@ -130,7 +136,17 @@ impl Session {
         if let Some(line) = self.lines.back_mut() {
             line.is_finished = true;
         }
-        self.render_scene.set_blade(None);
+        if self.blade.take().is_some() {
+            self.view.render_scene.set_blade(None);
+        }
+    }
+
+    /// Shows the blade under the pointer; while a line is drawn or cut, blades of the scene are hidden.
+    pub(super) fn show_blade(&mut self) {
+        if self.cuts() {
+            let blade = self.blade.as_ref().map(<[DVec3; 2]>::as_slice);
+            self.view.render_scene.set_blade(blade);
+        }
     }
 
     /// True while a line is being drawn or cut.
@@ -148,121 +164,89 @@ impl Session {
         })
     }
 
-    /// Drops all lines and ends the stroke of the one that is being cut.
+    /// Drops all lines.
     pub(super) fn drop_lines(&mut self) {
-        for line in std::mem::take(&mut self.lines) {
-            if let Some(stroke) = line.stroke {
-                // Undo may have ended it already.
-                let _ = self.simulation.end_stroke(stroke);
-            }
-        }
-        self.render_scene.set_blade(None);
+        self.lift_blade();
+        self.lines.clear();
     }
 
-    /// Moves the blade to its pose of the next frame.
-    pub(super) fn move_blade(&mut self) -> anyhow::Result<()> {
-        let Some(line) = self.lines.front_mut() else {
-            return Ok(());
-        };
+    /// Takes the motion of the blade in the next frame.
+    pub(super) fn next_motion(&mut self) -> Option<BladeMotion> {
+        let line = self.lines.front_mut()?;
         if let Some(pose) = line.waiting.pop_front() {
-            line.last_cut = Some(pose);
-            match line.stroke {
-                Some(stroke) => self.simulation.move_blade(stroke, &pose.ends)?,
-                None => {
-                    let before = self.undo_point(false)?;
-                    let stroke = self
-                        .simulation
-                        .begin_stroke(&pose.ends, self.tool_settings.snap)?;
-                    if let Some(line) = self.lines.front_mut() {
-                        (line.stroke, line.before) = (Some(stroke), Some(before));
-                    }
-                }
-            }
+            let begins = line.last_cut.replace(pose).is_none();
+            Some(if begins {
+                BladeMotion::Begin(pose.ends, self.tool_settings.snap)
+            } else {
+                BladeMotion::Move(pose.ends)
+            })
         } else if line.is_finished {
-            let stroke = line.stroke;
             self.lines.pop_front();
-            if let Some(stroke) = stroke {
-                self.simulation.end_stroke(stroke)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Adds the undo point of the line that is being cut once it has cut something.
-    pub(super) fn note_cut(&mut self) {
-        if let Some(before) = self.lines.front_mut().and_then(|line| line.before.take()) {
-            self.history.push(before);
+            Some(BladeMotion::End)
+        } else {
+            None
         }
     }
 
     fn blade_under(&self, pixel: [f64; 2], size: [f64; 2], surface: Option<f64>) -> [DVec3; 2] {
-        let bounds = self.render_scene.bounds(&self.simulation);
         let through = self.tool_settings.depth >= 1.0;
         let depth = (!through).then_some(self.tool_settings.depth * self.extent);
-        blade(&self.camera, pixel, size, bounds, surface, depth)
+        blade(&self.camera, pixel, size, self.view.bounds, surface, depth)
     }
 
-    /// Distance in m along the view ray of a pixel to the body.
-    fn surface_at(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<Option<f64>> {
-        self.simulation.read_back()?;
+    /// The point of the body under a pixel, in the view.
+    fn hit(&self, pixel: [f64; 2], size: [f64; 2]) -> Option<RayHit> {
         let (origin, direction) = self.camera.ray(pixel, size);
-        let hit = self.simulation.ray_cast(origin, direction);
-        Ok(hit.map(|hit| hit.distance))
+        let triangles = self.view.boundary.iter().copied();
+        RayHit::first(triangles, &self.view.positions, origin, direction)
     }
 
-    /// Grabs the body under a pixel; returns true if particles were grabbed, else [`Session::message`] is the reason.
-    pub(crate) fn grab_at(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<bool> {
+    /// Grabs the body under a pixel. If nothing can be grabbed, [`Session::message`] is the reason, for pinned particles
+    /// after the next job.
+    pub(crate) fn grab_at(&mut self, pixel: [f64; 2], size: [f64; 2]) {
         self.release();
-        self.simulation.read_back()?;
-        let (origin, direction) = self.camera.ray(pixel, size);
-        let positions = self.simulation.positions();
         self.message = None;
-        let Some(hit) = self.simulation.ray_cast(origin, direction) else {
+        let Some(hit) = self.hit(pixel, size) else {
             self.message = Some("Nothing to grab here");
-            return Ok(false);
+            return;
         };
         // A radius smaller than a triangle grabs the nearest corner.
+        let positions = &self.view.positions;
         let corners = hit
             .particles
             .map(|p| positions[p.index()].distance(hit.point));
         let nearest = corners.into_iter().fold(f64::INFINITY, f64::min);
-        let radius = (self.extent * self.tool_settings.radius).max(1.001 * nearest);
-        let grab = self
-            .simulation
-            .grab(hit.point, radius, self.tool_settings.compliance)?;
-        self.active_grab = grab.map(|grab| ActiveGrab {
-            grab,
+        let (origin, _) = self.camera.ray(pixel, size);
+        self.pull = Some(Pull {
             depth: (hit.point - origin).dot(self.camera.forward()),
             to: hit.point,
         });
-        if self.active_grab.is_none() {
-            self.message = Some("Pinned or attached here: grab a free part");
-        }
-        Ok(self.active_grab.is_some())
+        self.waiting.push(Command::Grab {
+            point: hit.point,
+            radius: (self.extent * self.tool_settings.radius).max(1.001 * nearest),
+            compliance: self.tool_settings.compliance,
+        });
     }
 
     /// Moves the grab's target under a pixel, at the depth at which it was grabbed.
-    pub(crate) fn pull(&mut self, pixel: [f64; 2], size: [f64; 2]) -> anyhow::Result<()> {
+    pub(crate) fn pull(&mut self, pixel: [f64; 2], size: [f64; 2]) {
         let (origin, direction) = self.camera.ray(pixel, size);
         let forward = self.camera.forward();
-        let Some(active) = &mut self.active_grab else {
-            return Ok(());
-        };
-        active.to = origin + direction * (active.depth / direction.dot(forward));
-        Ok(self.simulation.move_grab(active.grab, active.to)?)
+        if let Some(pull) = &mut self.pull {
+            pull.to = origin + direction * (pull.depth / direction.dot(forward));
+        }
     }
 
     /// Releases the grab, if there is one.
     pub(crate) fn release(&mut self) {
-        if let Some(active) = self.active_grab.take() {
-            // Undo may have released it already.
-            let _ = self.simulation.release(active.grab);
+        if self.pull.take().is_some() {
+            self.waiting.push(Command::Release);
         }
     }
 
     /// Target of the grab in use.
     pub(crate) fn grab_target(&self) -> Option<DVec3> {
-        self.active_grab.map(|active| active.to)
+        self.pull.map(|pull| pull.to)
     }
 }
 
@@ -279,8 +263,6 @@ mod tests {
             }),
             surface: None,
             is_finished: false,
-            stroke: None,
-            before: None,
         };
         for &pixel in pixels {
             let ends = [DVec3::ZERO; 2];

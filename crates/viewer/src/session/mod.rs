@@ -1,113 +1,171 @@
 //! [`Session`]: a simulation that is shown and edited in the window.
 //!
-//! A session owns all data of a loaded scene: the simulation, its render scene, undo points, the blade and the grab in
-//! use. Input comes in pixels and is converted to world space here.
+//! A session owns all data of a loaded scene. The window has the camera, the tools and a [`View`] to draw and to pick in;
+//! the [`Engine`] with the simulation is away on a thread while it works. Commands that are given meanwhile wait, in order,
+//! and are executed before the next step. Input comes in pixels and is converted to world space here.
 
+mod engine;
 mod interaction;
 
 use std::collections::VecDeque;
 
-use anyhow::Context;
+use anyhow::anyhow;
 use incise::mesh::glam::DVec3;
-use incise::report::FrameReport;
-use incise::scene::{Quantity, ReportSpec, SolverSpec};
-use incise::{Grab, Scene, Simulation, Snapshot};
-use incise_render::{Camera, ColorBy, Legend, RenderScene};
-use web_time::Instant;
+use incise::scene::SolverSpec;
+use incise::{Scene, Simulation};
+use incise_render::{Camera, ColorBy};
 
-use self::interaction::Line;
-use crate::history::{History, UndoPoint};
-use crate::load::Loaded;
-use crate::setting_effects::SettingEffects;
+use self::engine::{Command, Engine, FrameInput, Job};
+pub(crate) use self::engine::{Outcome, View};
+use self::interaction::{Line, Pull};
 use crate::settings::SettingChange;
-use crate::times::Times;
 use crate::tool::ToolSettings;
-
-/// Interval in frames between measurements of residuals.
-const EVERY: u64 = 5;
-
-/// A grab in use.
-#[derive(Clone, Copy, Debug)]
-struct ActiveGrab {
-    grab: Grab,
-    /// Depth of the target along the camera's direction in m.
-    depth: f64,
-    /// Target of the grab.
-    to: DVec3,
-}
+use crate::worker::Worker;
 
 /// A loaded simulation with its view and tools.
 #[derive(Debug)]
 pub(crate) struct Session {
     pub(crate) name: String,
-    pub(crate) scene: Scene,
-    pub(crate) simulation: Simulation,
-    pub(crate) render_scene: RenderScene,
     pub(crate) camera: Camera,
     pub(crate) tool_settings: ToolSettings,
-    pub(crate) times: Times,
-    pub(crate) effects: SettingEffects,
-    /// Time of the last frame in ms, until the device had finished.
-    pub(crate) frame_ms: f64,
-    /// The scale of the colors, if they represent numbers.
-    pub(crate) legend: Option<Legend>,
-    /// The quantity that the colors show.
-    shown: ColorBy,
-    /// The last report that measured the body.
-    pub(crate) measured: Option<FrameReport>,
-    /// True if residuals are measured.
-    measures: bool,
-    start: Snapshot,
-    history: History,
-    /// Drawn lines that are not cut to their end, oldest first.
-    lines: VecDeque<Line>,
-    active_grab: Option<ActiveGrab>,
+    /// What the last job left to show.
+    pub(crate) view: View,
     /// Result of the last input, for the status line.
     pub(crate) message: Option<&'static str>,
+    worker: Worker<Engine, (View, Outcome)>,
+    /// Commands for the next job.
+    waiting: Vec<Command>,
+    /// Settings that were chosen and are not in use yet.
+    chosen: Option<SolverSpec>,
+    /// True if residuals are measured.
+    measures: bool,
+    color_by: ColorBy,
+    /// True until the state of the view was drawn.
+    is_new: bool,
+    /// Drawn lines that are not cut to their end, oldest first.
+    lines: VecDeque<Line>,
+    /// The blade under the pointer.
+    blade: Option<[DVec3; 2]>,
+    pull: Option<Pull>,
     /// The diagonal of all bodies when they were loaded, in m.
     extent: f64,
-    /// First frames of the scene's own strokes.
-    scripted: Vec<u64>,
+    /// True if the scene has strokes of its own.
+    is_scripted: bool,
 }
 
 impl Session {
-    pub(crate) fn new(loaded: Loaded) -> anyhow::Result<Self> {
-        let Loaded {
+    pub(crate) fn new(name: String, scene: &Scene, simulation: Simulation) -> anyhow::Result<Self> {
+        let engine = Engine::new(scene, simulation)?;
+        let view = engine.view();
+        let [low, high] = view.bounds;
+        Ok(Self {
             name,
-            scene,
-            mut simulation,
-        } = loaded;
-        let render_scene = RenderScene::new(&simulation, &scene);
-        let [low, high] = render_scene.bounds(&simulation);
-        let start = simulation.snapshot()?;
-        let mut session = Self {
-            name,
-            scripted: scene
-                .stroke
-                .iter()
-                .map(|stroke| stroke.first_frame())
-                .collect(),
-            scene,
-            simulation,
-            render_scene,
             camera: Camera::fit(low, high),
             tool_settings: ToolSettings::default(),
-            times: Times::default(),
-            effects: SettingEffects::default(),
-            frame_ms: 0.0,
-            legend: None,
-            shown: ColorBy::Tissue,
-            measured: None,
-            measures: false,
-            start,
-            history: History::default(),
-            lines: VecDeque::new(),
-            active_grab: None,
+            view,
             message: None,
+            worker: Worker::new(engine),
+            waiting: Vec::new(),
+            chosen: None,
+            measures: true,
+            color_by: ColorBy::Tissue,
+            is_new: true,
+            lines: VecDeque::new(),
+            blade: None,
+            pull: None,
             extent: (high - low).length(),
+            is_scripted: !scene.stroke.is_empty(),
+        })
+    }
+
+    /// True if the simulation can make a step: it is here, and no undo waits that may end the run.
+    pub(crate) fn can_step(&self) -> bool {
+        let mut waiting = self.waiting.iter();
+        self.worker.here().is_some() && !waiting.any(|command| matches!(command, Command::Undo))
+    }
+
+    /// True while commands wait or are executed.
+    pub(crate) fn is_busy(&self) -> bool {
+        self.worker.here().is_none() || !self.waiting.is_empty()
+    }
+
+    /// Starts the commands that wait and some frames, unless the simulation is away; `wake` is called when they are done.
+    /// `reads_back` is true if positions are needed here, and not only on a device.
+    pub(crate) fn start(
+        &mut self,
+        frames: usize,
+        reads_back: bool,
+        wake: impl FnOnce() + Send + 'static,
+    ) {
+        if self.worker.here().is_none() {
+            return;
+        }
+        for _ in 0..frames {
+            self.step();
+        }
+        let lacks_positions = reads_back && !self.view.is_read_back;
+        if self.waiting.is_empty() && !lacks_positions {
+            return;
+        }
+        let commands = std::mem::take(&mut self.waiting);
+        let job = Job {
+            commands,
+            reads_back,
         };
-        session.measure(true)?;
-        Ok(session)
+        self.worker.start(move |engine| engine.run(job), wake);
+    }
+
+    /// Takes over the results of a job that is done.
+    pub(crate) fn poll(&mut self) -> Option<Outcome> {
+        let result = self.worker.poll()?;
+        Some(self.take_over(result))
+    }
+
+    fn take_over(&mut self, result: Result<(View, Outcome), String>) -> Outcome {
+        let outcome = match result {
+            Ok((view, outcome)) => {
+                (self.view, self.is_new) = (view, true);
+                outcome
+            }
+            Err(panic) => {
+                if let Some(engine) = self.worker.here_mut() {
+                    engine.distrust();
+                }
+                let error = anyhow!("{panic}").context(
+                    "internal error in the simulation; reset it or undo the last cut to go on",
+                );
+                Outcome {
+                    error: Some(error),
+                    ..Outcome::default()
+                }
+            }
+        };
+        if outcome.error.is_some() {
+            self.drop_lines();
+            self.waiting
+                .retain(|command| !matches!(command, Command::Step(_)));
+        }
+        let mut waiting = self.waiting.iter();
+        if outcome.missed && !waiting.any(|command| matches!(command, Command::Grab { .. })) {
+            self.pull = None;
+            self.message = Some("Pinned or attached here: grab a free part");
+        }
+        let mut waiting = self.waiting.iter();
+        if !waiting.any(|command| matches!(command, Command::Set(_))) {
+            self.chosen = None;
+        }
+        self.show_blade();
+        outcome
+    }
+
+    /// The simulation, unless it is away.
+    pub(crate) fn simulation(&self) -> Option<&Simulation> {
+        self.worker.here().map(Engine::simulation)
+    }
+
+    /// True if the simulation is here with a state that was not drawn yet; the next call returns false.
+    pub(crate) fn take_new(&mut self) -> bool {
+        self.worker.here().is_some() && std::mem::take(&mut self.is_new)
     }
 
     /// True if residuals are measured.
@@ -116,191 +174,85 @@ impl Session {
     }
 
     /// Turns the measurement of residuals on or off.
-    pub(crate) fn measure(&mut self, on: bool) -> anyhow::Result<()> {
-        let mut report = ReportSpec::default();
-        if on {
-            report = ReportSpec::default().with(|spec| {
-                spec.every = EVERY;
-                spec.quantities = vec![Quantity::Residual, Quantity::Volume];
-            });
-        }
-        self.simulation.set_report(report)?;
-        (self.measures, self.measured) = (on, None);
-        Ok(())
+    pub(crate) fn measure(&mut self, on: bool) {
+        self.measures = on;
+        self.waiting
+            .retain(|command| !matches!(command, Command::Measure(_)));
+        self.waiting.push(Command::Measure(on));
     }
 
-    /// Advances by one frame. If that fails, drawn lines are dropped and the whole body is drawn again.
-    pub(crate) fn step(&mut self) -> anyhow::Result<()> {
-        let result = self.frame();
-        if result.is_err() {
-            self.drop_lines();
-            self.render_scene.reset(&self.simulation);
+    /// Chooses what the colors show; displayed residuals are measured.
+    pub(crate) fn color(&mut self, by: ColorBy) {
+        if by == ColorBy::Residual && !self.measures {
+            self.measure(true);
         }
-        result
-    }
-
-    fn frame(&mut self) -> anyhow::Result<()> {
-        let frame = self.simulation.next_frame();
-        if self.scripted.contains(&frame) {
-            let point = self.undo_point(true)?;
-            self.history.push(point);
-        }
-        self.move_blade()?;
-        let start = Instant::now();
-        let report = self.simulation.step()?.clone();
-        self.wait()?;
-        self.frame_ms = start.elapsed().as_secs_f64() * 1e3;
-        self.render_scene.sync(&self.simulation);
-        self.show_scripted_blade(frame);
-        self.times.note(report.frame, report.ms);
-        self.effects.note(&report, self.frame_ms);
-        if report.cut.is_some() {
-            self.note_cut();
-        }
-        if report.residual.is_some() {
-            self.measured = Some(report);
-        }
-        Ok(())
-    }
-
-    /// Shows the blade of the scene's own strokes in a frame, unless a line is being drawn or cut.
-    fn show_scripted_blade(&mut self, frame: u64) {
-        if self.lines.is_empty() && !self.scripted.is_empty() {
-            let strokes = self.scene.stroke.iter();
-            let blade = strokes.filter_map(|stroke| stroke.blade_at(frame)).next();
-            self.render_scene.set_blade(blade.as_deref());
+        if by != self.color_by {
+            self.color_by = by;
+            self.waiting
+                .retain(|command| !matches!(command, Command::Color(_)));
+            self.waiting.push(Command::Color(by));
         }
     }
 
-    /// Waits for the device, so that times are those of its work.
-    fn wait(&self) -> anyhow::Result<()> {
-        match self.simulation.device_solvers().next() {
-            Some(solver) => Ok(solver.gpu().wait()?),
-            None => Ok(()),
-        }
+    /// Advances by one frame.
+    pub(crate) fn step(&mut self) {
+        let input = FrameInput {
+            blade: self.next_motion(),
+            target: self.pull.map(|pull| pull.to),
+        };
+        self.waiting.push(Command::Step(input));
     }
 
     /// True in a scene with strokes of its own that has not begun.
     pub(crate) fn waits_for_start(&self) -> bool {
-        self.simulation.next_frame() == 0 && !self.scripted.is_empty()
-    }
-
-    pub(crate) fn report(&self) -> &FrameReport {
-        self.simulation.report()
-    }
-
-    /// Colors the body for the present frame; as tissue while no residual has been measured.
-    pub(crate) fn color(&mut self, by: ColorBy) -> anyhow::Result<()> {
-        let residuals = match by {
-            ColorBy::Residual => self.simulation.residuals_of_tets(),
-            _ => None,
-        };
-        let by = match (by, &residuals) {
-            // Between two measured frames the colors of the last one stay.
-            (ColorBy::Residual, None) if self.shown == by => return Ok(()),
-            (ColorBy::Residual, None) => ColorBy::Tissue,
-            _ => by,
-        };
-        let painted = self
-            .render_scene
-            .color(&mut self.simulation, by, residuals.as_deref());
-        (self.legend, self.shown) = (painted?, by);
-        Ok(())
+        self.view.next_frame == 0 && self.is_scripted
     }
 
     /// Fits the view to the body.
     pub(crate) fn fit(&mut self) {
-        let [low, high] = self.render_scene.bounds(&self.simulation);
+        let [low, high] = self.view.bounds;
         let fitted = Camera::fit(low, high);
         (self.camera.target, self.camera.distance) = (fitted.target, fitted.distance);
     }
 
-    /// The present state with the stroke and the grab in use.
-    fn undo_point(&mut self, scripted: bool) -> anyhow::Result<UndoPoint> {
-        Ok(UndoPoint {
-            snapshot: self.simulation.snapshot()?,
-            scripted,
-            stroke: self.lines.front().and_then(|line| line.stroke),
-            grab: self.active_grab.map(|active| active.grab),
-        })
-    }
-
-    /// Number of strokes and resets that can be undone.
-    pub(crate) fn undo_points(&self) -> usize {
-        self.history.len()
-    }
-
-    /// Undoes the last stroke or reset; returns true for a stroke that is part of the scene and begins again, and `None` if
-    /// there is nothing to undo.
-    pub(crate) fn undo(&mut self) -> anyhow::Result<Option<bool>> {
-        let Some(point) = self.history.pop() else {
-            return Ok(None);
-        };
-        self.go_to(&point)?;
-        Ok(Some(point.scripted))
+    /// Undoes the last stroke or reset, if there is one.
+    pub(crate) fn undo(&mut self) {
+        if self.view.undo_points > 0 || self.is_busy() {
+            self.drop_input();
+            self.waiting.push(Command::Undo);
+        }
     }
 
     /// Resets to the first frame. The state before can be restored by [`Session::undo`].
-    pub(crate) fn reset(&mut self) -> anyhow::Result<()> {
-        if self.simulation.next_frame() > 0 {
-            let before = self.undo_point(false)?;
-            self.history.push(before);
+    pub(crate) fn reset(&mut self) {
+        self.drop_input();
+        if !matches!(self.waiting.last(), Some(Command::Reset)) {
+            self.waiting.push(Command::Reset);
         }
-        let start = UndoPoint {
-            snapshot: self.start.clone(),
-            scripted: false,
-            stroke: None,
-            grab: None,
-        };
-        self.go_to(&start)
     }
 
-    /// Restores the state of an undo point with the present solver settings and without a blade or grab.
-    fn go_to(&mut self, point: &UndoPoint) -> anyhow::Result<()> {
+    /// Drops lines and the grab; the engine drops them before it restores another state.
+    fn drop_input(&mut self) {
         self.drop_lines();
-        self.release();
-        let spec = self.simulation.solver_spec().clone();
-        self.simulation.restore(&point.snapshot)?;
-        // The stroke and the grab of that state are active again, but no input ends them: end them here.
-        if let Some(stroke) = point.stroke {
-            self.simulation.end_stroke(stroke)?;
+        self.pull = None;
+    }
+
+    /// Changes a setting. Waiting changes of the same setting, as from a drag of a slider, are one.
+    pub(crate) fn change_setting(&mut self, mut change: SettingChange) {
+        self.chosen = Some(change.spec.clone());
+        if let Some(Command::Set(last)) = self.waiting.last_mut()
+            && last.setting == change.setting
+        {
+            std::mem::swap(&mut last.from, &mut change.from);
+            *last = change;
+            return;
         }
-        if let Some(grab) = point.grab {
-            self.simulation.release(grab)?;
-        }
-        let changed = self.simulation.set_solver(&spec);
-        let measured = self.measure(self.measures);
-        // The body has changed even if the settings could not be kept.
-        self.repaint()?;
-        changed?;
-        measured
+        self.waiting.push(Command::Set(change));
     }
 
-    /// Redraws from the host's state; the device's state is drawn again after the next step.
-    fn repaint(&mut self) -> anyhow::Result<()> {
-        self.simulation.read_back()?;
-        self.render_scene.reset(&self.simulation);
-        (self.legend, self.shown) = (None, ColorBy::Tissue);
-        Ok(())
-    }
-
-    /// Applies a changed setting.
-    pub(crate) fn change_setting(&mut self, change: &SettingChange) -> anyhow::Result<()> {
-        let SettingChange {
-            setting,
-            from,
-            to,
-            spec,
-        } = change;
-        self.simulation
-            .set_solver(spec)
-            .with_context(|| format!("{setting} not changed, it stays at {from}"))?;
-        self.effects.note_change(setting, from, to);
-        self.repaint()
-    }
-
+    /// The settings, with those that were chosen while the simulation was away.
     pub(crate) fn solver(&self) -> &SolverSpec {
-        self.simulation.solver_spec()
+        self.chosen.as_ref().unwrap_or(&self.view.solver)
     }
 }
 
