@@ -55,6 +55,7 @@ fn scale(case: &Case) -> f64 {
 /// The built-in scene with the case as its body, held at its low end in x, and without strokes.
 fn scene(case: &Case, path: PathBuf) -> Scene {
     let mut scene = Scene::built_in();
+    scene.contact = None;
     scene.stroke.clear();
     scene.solver.substeps = 30.into();
     let body = &mut scene.body[0];

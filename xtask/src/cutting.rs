@@ -139,6 +139,7 @@ struct Cost {
 impl Cost {
     fn measure(model: &Model, frames: u32) -> anyhow::Result<Self> {
         let mut scene = Scene::built_in();
+        scene.contact = None;
         scene.world = incise::scene::WorldSpec::default();
         model.put_into(&mut scene.body[0]);
         scene.solver.substeps = 1.into();
@@ -267,6 +268,7 @@ fn speeds(model: &Model, quick: bool) -> anyhow::Result<Table> {
         "largest share of a frame",
     ]);
     let mut scene = Scene::built_in();
+    scene.contact = None;
     model.put_into(&mut scene.body[0]);
     let length = stroke(&model.mesh).1.length() * scene.body[0].scale;
     let all = [15, 30, FRAMES, 120, 240, 480];

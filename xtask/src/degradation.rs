@@ -161,6 +161,7 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
 /// A body at rest and strokes into it, with the default solver of the experiment.
 fn scene_at_rest(model: &Model, arguments: &DegradationArguments, snap: f64) -> Scene {
     let mut scene = Scene::built_in();
+    scene.contact = None;
     scene.world = incise::scene::WorldSpec::default();
     model.put_into(&mut scene.body[0]);
     scene.solver.substeps = 1.into();

@@ -312,6 +312,7 @@ impl Energy {
 /// The built-in scene without its stroke, with a ground below.
 fn scene(model: &Model, plain: bool, random: &mut Random) -> Scene {
     let mut scene = Scene::built_in();
+    scene.contact = None;
     scene.cutting.improve = !plain;
     scene.stroke.clear();
     model.put_into(&mut scene.body[0]);

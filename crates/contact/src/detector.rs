@@ -434,17 +434,37 @@ impl ContactDetector {
         self.edges.extend(edges);
     }
 
-    /// Into how many equal parts a frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
-    /// surfaces may approach each other in the frame by more than the search looks ahead.
+    /// Into how many equal parts the frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
+    /// surfaces that may meet in the frame may approach each other by more than the search looks ahead. O(surface
+    /// vertices + pieces²).
     ///
     /// # Panics
-    /// If there are fewer velocities than particles.
+    /// If there are fewer positions or velocities than particles, or a delta was left out.
     #[must_use]
-    pub fn intervals(&self, velocities: &[DVec3], frame_time: f64) -> u32 {
+    pub fn intervals(&mut self, state: &ContactState<'_>) -> u32 {
+        if self.search_is_due {
+            self.list_vertices(state);
+        }
+        self.fit_parts(state);
         let ahead = (self.settings.reach + self.settings.skin) * self.mean_edge;
-        let vertices = self.surface.vertices();
-        let speed = Bounds::around(vertices.map(|p| velocities[p.index()]));
-        match diagonal(&speed) * frame_time {
+        let mut most = 0.0_f64;
+        let parts = self.room.parts.iter().filter(|part| part.body != NONE);
+        for (i, one) in parts.clone().enumerate() {
+            if self.settings.self_contact {
+                let [_, speed] = one.within();
+                most = most.max(speed * state.frame_time);
+            }
+            for other in parts.clone().skip(i + 1) {
+                let may_touch =
+                    one.body == other.body || self.settings.bodies.allow(one.body, other.body);
+                let approach = one.fastest(other) * state.frame_time;
+                let around = one.bounds.widened(approach + ahead);
+                if may_touch && around.overlaps(&other.bounds) {
+                    most = most.max(approach);
+                }
+            }
+        }
+        match most {
             approach if approach <= ahead => 1,
             approach if approach <= 2.0 * ahead => 2,
             _ => 4,
@@ -464,17 +484,9 @@ impl ContactDetector {
         self.searched_at.clear();
     }
 
-    /// Looks at all parts: how they have moved and may move towards those that they may touch and are near.
-    fn survey(&mut self, state: &ContactState<'_>) -> Moved {
-        let limit = self.settings.reach * self.mean_edge;
-        let thickness = self.settings.thickness;
-        let widest = (self.settings.skin * self.mean_edge + limit + thickness).max(self.reach);
-        let Room {
-            parts,
-            sorted,
-            ahead,
-            ..
-        } = &mut self.room;
+    /// Finds the boxes and the motions of all parts.
+    fn fit_parts(&mut self, state: &ContactState<'_>) {
+        let parts = &mut self.room.parts;
         let number = self.parts.iter().map(|&part| part as usize);
         let motions = self.vertices.iter().enumerate().map(|(i, &vertex)| {
             let x = state.positions[vertex as usize];
@@ -496,6 +508,20 @@ impl ContactDetector {
         for (part, (x, moves)) in number.zip(motions) {
             parts[part].leave(x, moves);
         }
+    }
+
+    /// Looks at all parts: how they have moved and may move towards those that they may touch and are near.
+    fn survey(&mut self, state: &ContactState<'_>) -> Moved {
+        self.fit_parts(state);
+        let limit = self.settings.reach * self.mean_edge;
+        let thickness = self.settings.thickness;
+        let widest = (self.settings.skin * self.mean_edge + limit + thickness).max(self.reach);
+        let Room {
+            parts,
+            sorted,
+            ahead,
+            ..
+        } = &mut self.room;
         sorted.clear();
         sorted.extend((0..index(parts.len())).filter(|&p| parts[p as usize].body != NONE));
         let low = |p: &u32| parts[*p as usize].bounds.low.x;
@@ -959,11 +985,6 @@ fn beneath(contact: &FaceContact, positions: &[DVec3]) -> [f64; 3] {
     } else {
         [1.0, 0.0, 0.0]
     }
-}
-
-/// The length of the diagonal of a box, 0 for an empty one.
-fn diagonal(bounds: &Bounds) -> f64 {
-    bounds.size().max(DVec3::ZERO).length()
 }
 
 /// Whether two lists have other particles.

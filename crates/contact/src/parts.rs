@@ -156,6 +156,12 @@ impl Part {
         velocity.distance(velocities.rigid(x - self.center))
     }
 
+    /// A bound on the speed in m/s of any point of one part relative to any of the other.
+    pub(crate) fn fastest(&self, other: &Self) -> f64 {
+        let [_, one] = &self.fields;
+        furthest(&one.whole, &other.fields[1].whole, DVec3::ZERO)
+    }
+
     /// The speed in m/s at which the motions of two parts as a whole may bring points together that are within `reach` of
     /// each other.
     pub(crate) fn approach(&self, other: &Self, reach: f64) -> f64 {

@@ -44,7 +44,7 @@ fn detect(island: &Island, solver: &mut AnySolver) -> Result<f64, Error> {
     for frame in 0..=FRAMES {
         // Bodies that move are searched for in nearly all frames.
         contacts.search_again();
-        contacts.begin_frame(solver, time, settings.substeps);
+        contacts.begin_frame(solver, cuttable, pieces, time, settings.substeps);
         contacts.update(solver, cuttable, pieces, time)?;
         if frame > 0 {
             fastest = fastest.min(contacts.take_milliseconds());

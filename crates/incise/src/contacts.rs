@@ -269,10 +269,24 @@ impl Contacts {
     }
 
     /// Into how many parts the frame to come is divided.
-    pub(crate) fn begin_frame(&mut self, solver: &AnySolver, time: f64, substeps: u32) -> u32 {
+    pub(crate) fn begin_frame(
+        &mut self,
+        solver: &AnySolver,
+        mesh: &CuttableMesh,
+        pieces: &PieceTracker,
+        time: f64,
+        substeps: u32,
+    ) -> u32 {
         let start = Instant::now();
         self.read(solver);
-        let parts = self.detector.intervals(&self.room.velocities, time);
+        let parts = self.detector.intervals(&ContactState {
+            mesh,
+            pieces,
+            positions: &self.room.positions,
+            velocities: &self.room.velocities,
+            fixed: &self.room.fixed,
+            frame_time: time,
+        });
         self.room.touches.clear();
         self.milliseconds = milliseconds(start.elapsed());
         parts.min(substeps)

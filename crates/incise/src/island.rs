@@ -347,7 +347,7 @@ impl Island {
         // Contacts are found here, from the state at the start of the frame.
         report.repaired += solver.backend_mut().read_back()?;
         let (time, substeps) = (settings.time_step, settings.substeps);
-        let parts = contacts.begin_frame(solver, time, substeps);
+        let parts = contacts.begin_frame(solver, cuttable, pieces, time, substeps);
         let end = |part: u32| {
             let end = u64::from(substeps) * u64::from(part) / u64::from(parts);
             u32::try_from(end).unwrap_or(substeps)

@@ -85,6 +85,7 @@ fn is_full(error: &anyhow::Error) -> bool {
 /// Scene, with a stroke of `stroke_frames` frames if not 0.
 fn scene(model: &Model, clustering: &str, stroke_frames: u32) -> Scene {
     let mut scene = Scene::built_in();
+    scene.contact = None;
     scene.world.ground = None;
     model.put_into(&mut scene.body[0]);
     scene.solver.substeps = SUBSTEPS.into();

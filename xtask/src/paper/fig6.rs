@@ -4,6 +4,7 @@
 //! have a tint of their own.
 
 use incise::cutting::FaceTag;
+use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +39,12 @@ pub(super) fn experiment(arguments: &ExperimentArguments) -> Experiment<Row> {
 
 fn measure(name: &str, arguments: &ExperimentArguments) -> anyhow::Result<Row> {
     let mut scene = Scene::built_in();
+    scene.contact = None;
+    scene.stroke = vec![StrokeSpec::sweep(
+        [4, 64],
+        vec![[0.02, -0.25, 0.14], [0.03, 0.25, 0.14]],
+        vec![[0.0; 3], [0.0, 0.0, -0.4]],
+    )];
     let file = PaperMesh::named(name)?.file(arguments)?;
     (scene.body[0].mesh, scene.body[0].shape) = (Some(file), None);
     let mut simulation = Simulation::with_threads(&scene, 1)?;

@@ -18,6 +18,7 @@ pub(super) fn cut_at_rest(
     blades: u64,
 ) -> anyhow::Result<Scene> {
     let mut scene = Scene::built_in();
+    scene.contact = None;
     scene.world = WorldSpec::default();
     (scene.body[0].mesh, scene.body[0].shape) = (Some(body.file(arguments)?), None);
     scene.solver.substeps = 1.into();

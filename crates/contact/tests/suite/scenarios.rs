@@ -534,7 +534,7 @@ fn when_a_search_is_due() {
         scene.positions.iter_mut().for_each(|x| x.z -= 50.0 * FRAME);
         assert!(!scene.update().searched);
     }
-    assert_eq!(scene.contacts.intervals(&scene.velocities, FRAME), 1);
+    assert_eq!(scene.intervals(), 1);
     // Coming closer is.
     scene.shift(1, DVec3::new(0.3, 0.0, 0.0));
     assert!(scene.update().searched);
@@ -546,16 +546,13 @@ fn when_a_search_is_due() {
     }
     assert!(scene.update().searched);
     assert!(scene.contacts.reach() > reach);
-    assert_eq!(scene.contacts.intervals(&scene.velocities, FRAME), 1);
+    assert_eq!(scene.intervals(), 1);
     for (speed, intervals) in [(1.0, 2), (3.0, 4), (30.0, 4)] {
         for p in scene.particles_of(1) {
             scene.velocities[p] =
                 DVec3::new(0.0, 0.0, -50.0 - speed * scene.contacts.mean_edge() / FRAME);
         }
-        assert_eq!(
-            scene.contacts.intervals(&scene.velocities, FRAME),
-            intervals
-        );
+        assert_eq!(scene.intervals(), intervals);
     }
 }
 

@@ -97,6 +97,18 @@ impl Scene {
         self.contacts.update(&state)
     }
 
+    /// Into how many parts a frame is divided.
+    pub(crate) fn intervals(&mut self) -> u32 {
+        self.contacts.intervals(&ContactState {
+            mesh: &self.body,
+            pieces: &self.pieces,
+            positions: &self.positions,
+            velocities: &self.velocities,
+            fixed: &self.fixed,
+            frame_time: self.frame_time,
+        })
+    }
+
     /// An update that searches.
     pub(crate) fn search(&mut self) {
         let settings = self.contacts.settings().clone();

@@ -187,6 +187,7 @@ mod tests {
     #[test]
     fn the_table_of_a_candidate_reads_back_as_it() {
         let mut scene = Scene::built_in();
+        scene.contact = None;
         scene.body[0].damping = 0.0;
         for limit in [1.0, f64::INFINITY] {
             scene.solver.kappa_limit = limit;
@@ -220,6 +221,7 @@ mod tests {
     #[test]
     fn substeps_have_the_default_accuracy() {
         let mut scene = Scene::built_in();
+        scene.contact = None;
         let substeps = accurate_substeps(&scene).unwrap();
         for (substeps, accurate) in [(substeps, true), (substeps - 1, false)] {
             scene.solver.substeps = substeps.into();

@@ -292,9 +292,9 @@ impl StrokeSpec {
     /// ```
     /// use incise::Scene;
     ///
-    /// let stroke = &Scene::built_in().stroke[0]; // frames 4 to 64, straight down
+    /// let stroke = &Scene::built_in().stroke[0]; // frames 4 to 64, obliquely down
     /// let (start, middle) = (stroke.blade_at(4).unwrap(), stroke.blade_at(34).unwrap());
-    /// assert!((start[0].z - middle[0].z - 0.2).abs() < 1e-12);
+    /// assert!((start[0].z - middle[0].z - 0.14).abs() < 1e-12);
     /// assert_eq!(stroke.blade_at(65), None);
     /// ```
     #[must_use]

@@ -39,6 +39,7 @@ pub(crate) fn counting(gpu: &GpuContext) -> Arc<GpuContext> {
 
 fn scene(tets: usize, clustering: &str) -> Scene {
     let mut scene = Scene::built_in();
+    scene.contact = None;
     scene.body[0].shape = Some(incise::scene::ShapeSpec::new("liver", tets));
     scene.solver.clustering = clustering.into();
     // A third of what it has, for the sake of time.
