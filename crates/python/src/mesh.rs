@@ -15,6 +15,7 @@ use pyo3::types::{PyDict, PyString, PyTuple, PyType};
 use crate::array;
 use crate::compute::compute;
 use crate::failure::{invalid, refused_file};
+use crate::value::Whole;
 
 /// A tetrahedral mesh at rest.
 ///
@@ -101,7 +102,8 @@ impl Mesh {
     /// ``torus``, ``plate``, ``liver``, ``bunny``, ``armadillo``, ``gear``, ``shell`` or ``pair``.
     #[staticmethod]
     #[pyo3(signature = (shape, tets))]
-    fn generate(py: Python<'_>, shape: &str, tets: usize) -> PyResult<Self> {
+    fn generate(py: Python<'_>, shape: &str, tets: Whole<usize>) -> PyResult<Self> {
+        let tets = tets.named("tets")?;
         let mesh = compute(py, || meshing::generate(Shape::from_name(shape)?, tets))?;
         mesh.map(Self::new).map_err(|error| unmeshed(&error))
     }
@@ -116,8 +118,9 @@ impl Mesh {
         py: Python<'_>,
         points: &Bound<'_, PyAny>,
         triangles: &Bound<'_, PyAny>,
-        tets: usize,
+        tets: Whole<usize>,
     ) -> PyResult<Self> {
+        let tets = tets.named("tets")?;
         let positions = array::vectors("points", points)?;
         let of = "the number of a point";
         let triangles = array::rows::<3>("triangles", triangles, positions.len(), of)?;

@@ -12,7 +12,7 @@ use pyo3::types::PyDict;
 
 use crate::compute::compute;
 use crate::failure::{failed, invalid, refused, refused_at};
-use crate::value::{from_serde, from_toml, scene_of, table};
+use crate::value::{Whole, from_serde, from_toml, optional, scene_of, table};
 
 /// A scene and the file that it came from.
 #[derive(Debug)]
@@ -99,13 +99,14 @@ pub(crate) fn advise<'py>(
     py: Python<'py>,
     scene: &Bound<'py, PyAny>,
     budget_ms: f64,
-    frames: Option<u32>,
-    threads: Option<usize>,
+    frames: Option<Whole<u32>>,
+    threads: Option<Whole<usize>>,
 ) -> PyResult<Bound<'py, PyAny>> {
     let source = Source::from_argument(scene)?;
+    let frames = optional("frames", frames)?;
     let frames = frames.unwrap_or_else(|| default_frames(&source.scene));
     let mut question = AdviseSettings::new(budget_ms, frames);
-    question.threads = threads;
+    question.threads = optional("threads", threads)?;
     let advice = compute(py, || search(&source.scene, &question))?;
     let advice = advice.map_err(|error| source.refused(&error))?;
     let result = from_serde(py, &advice)?;

@@ -16,12 +16,14 @@ use pyo3::types::{PyList, PyTuple};
 use crate::array;
 use crate::compute::compute;
 use crate::failure::{failed, invalid, sentence};
+use crate::value::{Whole, optional};
 
 /// The largest number of particles that the arrays may name.
 const PARTICLES: usize = u32::MAX as usize;
 
 /// Reads constraints: rows of particles, CSR as a pair of arrays, or a sparse matrix with `indptr` and `indices`.
-fn incidence(object: &Bound<'_, PyAny>, particles: Option<usize>) -> PyResult<Incidence> {
+fn incidence(object: &Bound<'_, PyAny>, particles: Option<Whole<usize>>) -> PyResult<Incidence> {
+    let particles = optional("particles", particles)?;
     let limit = particles.unwrap_or(PARTICLES);
     let of = "the number of a particle";
     let (offsets, values) = match csr(object)? {
@@ -221,15 +223,19 @@ impl Clustering {
 /// Returns a ``Coloring``: always proper, and the same for any number of threads. Raises ``ValueError`` for particles that
 /// do not exist, a constraint that names a particle twice, and unknown names.
 #[pyfunction]
-#[pyo3(signature = (constraints, algorithm="auto", *, particles=None, seed=0, balance=false))]
+#[pyo3(
+    signature = (constraints, algorithm="auto", *, particles=None, seed=Whole::from(0), balance=false),
+    text_signature = "(constraints, algorithm='auto', *, particles=None, seed=0, balance=False)"
+)]
 pub(crate) fn color(
     py: Python<'_>,
     constraints: &Bound<'_, PyAny>,
     algorithm: &str,
-    particles: Option<usize>,
-    seed: u64,
+    particles: Option<Whole<usize>>,
+    seed: Whole<u64>,
     balance: bool,
 ) -> PyResult<Coloring> {
+    let seed = seed.named("seed")?;
     let incidence = incidence(constraints, particles)?;
     let algorithm: Algorithm = algorithm.parse().map_err(|error| {
         PyValueError::new_err(format!(
@@ -274,7 +280,7 @@ pub(crate) fn cluster(
     py: Python<'_>,
     constraints: &Bound<'_, PyAny>,
     method: &str,
-    particles: Option<usize>,
+    particles: Option<Whole<usize>>,
 ) -> PyResult<Clustering> {
     let incidence = incidence(constraints, particles)?;
     let method: Method = method.parse().map_err(|error| {

@@ -26,7 +26,9 @@ use crate::mesh::Mesh;
 use crate::scene::Source;
 use crate::snapshot::Snapshot;
 use crate::surface::{Surface, TrackedSkin, tag};
-use crate::value::{from_serde, from_toml, scene_of, scene_with, scene_with_one, to_toml};
+use crate::value::{
+    Whole, from_serde, from_toml, optional, scene_of, scene_with, scene_with_one, to_toml,
+};
 
 /// A simulation with the skin that `surface` keeps.
 #[derive(Debug)]
@@ -203,9 +205,9 @@ fn short(key: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
 fn build(
     py: Python<'_>,
     mut builder: SimulationBuilder,
-    threads: Option<usize>,
+    threads: Option<Whole<usize>>,
 ) -> PyResult<Result<Simulation, incise::Error>> {
-    if let Some(threads) = threads {
+    if let Some(threads) = optional("threads", threads)? {
         builder.threads(threads);
     }
     Ok(compute(py, || builder.build())?.map(Simulation::new))
@@ -261,7 +263,7 @@ impl Simulation {
         distances: Option<&Bound<'_, PyAny>>,
         strokes: Option<&Bound<'_, PyAny>>,
         cutting: Option<&Bound<'_, PyAny>>,
-        threads: Option<usize>,
+        threads: Option<Whole<usize>>,
     ) -> PyResult<Self> {
         let mut scene = Table::new();
         let mut world = Table::new();
@@ -308,7 +310,7 @@ impl Simulation {
         _: &Bound<'_, PyType>,
         py: Python<'_>,
         scene: &Bound<'_, PyAny>,
-        threads: Option<usize>,
+        threads: Option<Whole<usize>>,
     ) -> PyResult<Self> {
         let source = Source::from_argument(scene)?;
         let builder = SimulationBuilder::from_scene(source.scene.clone());
@@ -322,7 +324,7 @@ impl Simulation {
         _: &Bound<'_, PyType>,
         py: Python<'_>,
         text: &str,
-        threads: Option<usize>,
+        threads: Option<Whole<usize>>,
     ) -> PyResult<Self> {
         let scene = incise::Scene::from_toml(text).map_err(|error| refused(&error))?;
         let builder = SimulationBuilder::from_scene(scene);
@@ -354,7 +356,8 @@ impl Simulation {
 
     /// Advances by ``frames`` frames and returns their reports. Ctrl-C ends it between two frames.
     #[pyo3(signature = (frames, /))]
-    fn run<'py>(&self, py: Python<'py>, frames: usize) -> PyResult<Bound<'py, PyList>> {
+    fn run<'py>(&self, py: Python<'py>, frames: Whole<usize>) -> PyResult<Bound<'py, PyList>> {
+        let frames = frames.named("frames")?;
         let reports = PyList::empty(py);
         for _ in 0..frames {
             reports.append(self.step(py)?)?;
@@ -381,6 +384,17 @@ impl Simulation {
             Ok(simulation.positions().to_vec())
         })?;
         array::from_vectors(py, &positions)
+    }
+
+    /// Velocities of all particles in m/s, shape (n, 3), float64, in the order of ``positions``: a read-only copy that stays
+    /// valid.
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let velocities = self.try_with(py, |simulation| {
+            simulation.read_back()?;
+            Ok(simulation.velocities())
+        })?;
+        array::from_vectors(py, &velocities)
     }
 
     /// The mesh at rest of all bodies with all cuts made so far. A removal of tets leaves unused points.
@@ -517,9 +531,10 @@ impl Simulation {
         py: Python<'_>,
         point: &Bound<'_, PyAny>,
         normal: &Bound<'_, PyAny>,
-        frame: Option<u64>,
+        frame: Option<Whole<u64>>,
         snap: f64,
     ) -> PyResult<()> {
+        let frame = optional("frame", frame)?;
         let (point, normal) = (vector("point", point)?, vector("normal", normal)?);
         let cut = self.with(py, |state| {
             let frame = frame_or_next(state, frame);
@@ -537,9 +552,10 @@ impl Simulation {
         py: Python<'_>,
         points: &Bound<'_, PyAny>,
         triangles: &Bound<'_, PyAny>,
-        frame: Option<u64>,
+        frame: Option<Whole<u64>>,
         snap: f64,
     ) -> PyResult<()> {
+        let frame = optional("frame", frame)?;
         let points = triples("points", points)?;
         let of = "the number of a point";
         let triangles = array::rows::<3>("triangles", triangles, points.len(), of)?;
@@ -586,9 +602,10 @@ impl Simulation {
         &self,
         py: Python<'_>,
         region: &Bound<'_, PyAny>,
-        frame: Option<u64>,
+        frame: Option<Whole<u64>>,
         snap: f64,
     ) -> PyResult<()> {
+        let frame = optional("frame", frame)?;
         let region = self::region(region)?;
         let cut = self.with(py, |state| {
             let stroke = StrokeSpec::punch(frame_or_next(state, frame), region);
@@ -603,8 +620,9 @@ impl Simulation {
         &self,
         py: Python<'_>,
         region: &Bound<'_, PyAny>,
-        frame: Option<u64>,
+        frame: Option<Whole<u64>>,
     ) -> PyResult<()> {
+        let frame = optional("frame", frame)?;
         let region = self::region(region)?;
         let cut = self.with(py, |state| {
             let stroke = StrokeSpec::remove(frame_or_next(state, frame), region);
@@ -633,14 +651,21 @@ impl Simulation {
 
     /// Sets the blade of a stroke for the start of the next frame: shape (k, 3) in m, with the points it began with.
     #[pyo3(signature = (stroke, blade))]
-    fn move_blade(&self, py: Python<'_>, stroke: u32, blade: &Bound<'_, PyAny>) -> PyResult<()> {
+    fn move_blade(
+        &self,
+        py: Python<'_>,
+        stroke: Whole<u32>,
+        blade: &Bound<'_, PyAny>,
+    ) -> PyResult<()> {
+        let stroke = stroke.named("stroke")?;
         let blade = vectors("blade", blade)?;
         self.try_with(py, |simulation| simulation.move_blade(stroke, &blade))
     }
 
     /// Ends a stroke: after the next frame if its blade was moved since the last one, otherwise at once.
     #[pyo3(signature = (stroke))]
-    fn end_stroke(&self, py: Python<'_>, stroke: u32) -> PyResult<()> {
+    fn end_stroke(&self, py: Python<'_>, stroke: Whole<u32>) -> PyResult<()> {
+        let stroke = stroke.named("stroke")?;
         self.try_with(py, |simulation| simulation.end_stroke(stroke))
     }
 
@@ -797,7 +822,8 @@ impl Simulation {
 
     /// Removes a body with all its pieces at the start of the next frame. Its particles stay, without tets.
     #[pyo3(signature = (body, /))]
-    fn remove_body(&self, py: Python<'_>, body: usize) -> PyResult<()> {
+    fn remove_body(&self, py: Python<'_>, body: Whole<usize>) -> PyResult<()> {
+        let body = body.named("body")?;
         self.with(py, |state| {
             let body = state.body(body)?;
             let removed = state.simulation.remove_body(body);
@@ -984,7 +1010,12 @@ impl Simulation {
 
     /// Mean force of the last frame from all bodies on the solid blade of a stroke, as in ``attachment_force``.
     #[pyo3(signature = (stroke))]
-    fn blade_force<'py>(&self, py: Python<'py>, stroke: u32) -> PyResult<Bound<'py, PyDict>> {
+    fn blade_force<'py>(
+        &self,
+        py: Python<'py>,
+        stroke: Whole<u32>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let stroke = stroke.named("stroke")?;
         force_dict(
             py,
             self.try_with(py, |simulation| simulation.blade_force(stroke))?,
@@ -993,7 +1024,12 @@ impl Simulation {
 
     /// Mean force of the last frame from a body on what its pinned particles are fixed to, as in ``attachment_force``.
     #[pyo3(signature = (body))]
-    fn fixed_force<'py>(&self, py: Python<'py>, body: usize) -> PyResult<Bound<'py, PyDict>> {
+    fn fixed_force<'py>(
+        &self,
+        py: Python<'py>,
+        body: Whole<usize>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let body = body.named("body")?;
         let force = self.with(py, |state| {
             let force = state.simulation.fixed_force(state.body(body)?);
             force.map_err(|error| refused(&error))
@@ -1007,9 +1043,11 @@ impl Simulation {
     fn contact_force<'py>(
         &self,
         py: Python<'py>,
-        a: usize,
-        b: usize,
+        a: Whole<usize>,
+        b: Whole<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let a = a.named("a")?;
+        let b = b.named("b")?;
         let force = self.with(py, |state| {
             let force = state
                 .simulation
@@ -1037,7 +1075,8 @@ impl Simulation {
 
     /// What the blade of a stroke has parted so far against its toughness: work in J and area in m².
     #[pyo3(signature = (stroke))]
-    fn cut_work(&self, py: Python<'_>, stroke: u32) -> PyResult<(f64, f64)> {
+    fn cut_work(&self, py: Python<'_>, stroke: Whole<u32>) -> PyResult<(f64, f64)> {
+        let stroke = stroke.named("stroke")?;
         let parted = self.try_with(py, |simulation| simulation.cut_work(stroke))?;
         Ok((parted.work, parted.area))
     }

@@ -5,7 +5,7 @@
 
 use incise::Scene;
 use pyo3::IntoPyObjectExt;
-use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::exceptions::{PyOverflowError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use serde::Serialize;
@@ -13,6 +13,49 @@ use serde_json::Value as Json;
 use toml::{Table, Value};
 
 use crate::failure::refused;
+
+/// A whole number as an argument. One that is out of range is an error with the name of the argument, not Python's
+/// `OverflowError` without one.
+#[derive(Clone, Debug)]
+pub(crate) struct Whole<T>(Result<T, String>);
+
+impl<T> From<T> for Whole<T> {
+    fn from(number: T) -> Self {
+        Self(Ok(number))
+    }
+}
+
+impl<'a, 'py, T: FromPyObject<'a, 'py>> FromPyObject<'a, 'py> for Whole<T> {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        match T::extract(object).map_err(Into::<PyErr>::into) {
+            Ok(number) => Ok(number.into()),
+            Err(error) if error.is_instance_of::<PyOverflowError>(object.py()) => {
+                Ok(Self(Err(object.to_string())))
+            }
+            Err(error) => Err(error),
+        }
+    }
+}
+
+impl<T> Whole<T> {
+    /// The number of an argument with a name.
+    pub(crate) fn named(self, name: &str) -> PyResult<T> {
+        self.0.map_err(|text| {
+            let why = match text.starts_with('-') {
+                true => "it must not be negative",
+                false => "it is too large",
+            };
+            PyValueError::new_err(format!("{name} is {text}: {why}"))
+        })
+    }
+}
+
+/// The number of an argument that may be absent.
+pub(crate) fn optional<T>(name: &str, number: Option<Whole<T>>) -> PyResult<Option<T>> {
+    number.map(|number| number.named(name)).transpose()
+}
 
 /// A value of Python as TOML; `None` for Python's `None`. `place` is its key, for messages.
 pub(crate) fn to_toml(place: &str, object: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
@@ -22,7 +65,7 @@ pub(crate) fn to_toml(place: &str, object: &Bound<'_, PyAny>) -> PyResult<Option
     let value = if object.is_instance_of::<PyBool>() {
         Value::Boolean(object.extract()?)
     } else if object.is_instance_of::<PyInt>() {
-        Value::Integer(object.extract()?)
+        Value::Integer(object.extract::<Whole<i64>>()?.named(place)?)
     } else if object.is_instance_of::<PyFloat>() {
         Value::Float(object.extract()?)
     } else if object.is_instance_of::<PyString>() {

@@ -131,6 +131,35 @@ def test_bad_values_have_their_key(bar):
     assert sim.step()["pieces"] == 1
 
 
+def test_whole_numbers_out_of_range_are_named(bar):
+    body, edges = incise.Body(bar), [[0, 1]]
+    sim = incise.Simulation(body)
+    surface = ([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    calls = {
+        "threads": lambda n: incise.Simulation(body, threads=n),
+        "frames": sim.run,
+        "frame": lambda n: sim.cut_plane((0, 0, 0), (1, 0, 0), frame=n),
+        "stroke": sim.end_stroke,
+        "body": sim.fixed_force,
+        "b": lambda n: sim.contact_force(0, n),
+        "tets": lambda n: incise.Mesh.tetrahedralize(*surface, n),
+        "particles": lambda n: incise.cluster(edges, particles=n),
+        "seed": lambda n: incise.color(edges, seed=n),
+    }
+    for name, call in calls.items():
+        with pytest.raises(ValueError, match=f"^{name} is -1: it must not be negative"):
+            call(-1)
+        with pytest.raises(ValueError, match=f"^{name} is {2**70}: it is too large"):
+            call(2**70)
+        with pytest.raises(TypeError):
+            call("1")
+    with pytest.raises(ValueError, match="tets is -5: it must not be negative"):
+        incise.Mesh.generate("box", -5)
+    with pytest.raises(ValueError, match="solver.substeps is .*: it is too large"):
+        incise.Simulation(body, solver={"substeps": 2**70})
+    assert sim.run(np.int64(2))[-1]["frame"] == 1
+
+
 def test_pinned_in_every_form(bar):
     points, tets = bar
     chosen = points[:, 0] > 0.95

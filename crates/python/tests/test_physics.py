@@ -23,6 +23,7 @@ def test_free_fall(substeps):
     t = frames * sim.time_step
     assert reports[-1]["time_s"] == pytest.approx(t, rel=1e-12)
     dt = sim.time_step / substeps
+    np.testing.assert_allclose(sim.velocities[:, 1], -G * t, rtol=1e-9)
     fall = sim.positions - points
     np.testing.assert_allclose(fall[:, 1], -G * t * (t + dt) / 2, rtol=1e-9)
     np.testing.assert_allclose(fall[:, [0, 2]], 0.0, atol=1e-12)
@@ -37,6 +38,8 @@ def test_throw_and_spin(bar):
     sim.run(10)
     t = 10 * sim.time_step
     np.testing.assert_allclose(sim.positions, points + t * np.array([2.0, 0.0, -1.0]), atol=1e-9)
+    assert sim.velocities.shape == points.shape and not sim.velocities.flags.writeable
+    np.testing.assert_allclose(sim.velocities, np.tile([2.0, 0.0, -1.0], (len(points), 1)), atol=1e-9)
     # A spin about the center leaves the center of mass where it is.
     sim = incise.Simulation(incise.Body((points, tets), young_modulus=1e6), solver=f64(20))
     center = np.array([0.5, 0.1, 0.1])

@@ -25,6 +25,7 @@ use crate::help::{self, Action};
 use crate::load::{Loading, Source};
 use crate::open_dialog::OpenDialog;
 use crate::panel::{self, Controls, UiCommands};
+use crate::sentence::sentence;
 use crate::session::Session;
 use crate::tool::Tool;
 
@@ -36,7 +37,7 @@ struct ErrorDialog {
 
 impl ErrorDialog {
     fn new(title: &'static str, error: &anyhow::Error) -> Self {
-        let text = format!("{error:#}");
+        let text = sentence(error);
         Self { title, text }
     }
 }

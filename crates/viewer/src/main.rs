@@ -17,6 +17,7 @@ mod open_dialog;
 #[cfg(target_family = "wasm")]
 mod page;
 mod panel;
+mod sentence;
 mod session;
 mod setting_effects;
 mod settings;

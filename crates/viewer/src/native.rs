@@ -15,6 +15,7 @@ use incise::gpu::GpuContext;
 
 use crate::app::Viewer;
 use crate::load::Source;
+use crate::sentence::sentence;
 use crate::{graphics, load};
 
 /// A window to cut soft bodies in.
@@ -81,7 +82,7 @@ pub(crate) fn main() -> ExitCode {
 
 #[expect(clippy::print_stderr, reason = "a program without a window yet")]
 fn complain(error: &anyhow::Error) {
-    eprintln!("incise-viewer: {error:#}");
+    eprintln!("incise-viewer: {}", sentence(error));
 }
 
 /// Opens the window and stays until it is closed.

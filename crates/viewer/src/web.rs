@@ -14,6 +14,7 @@ use crate::app::Viewer;
 use crate::graphics;
 use crate::load::{Source, TETS};
 use crate::page::{canvas, set};
+use crate::sentence::sentence;
 
 /// Starts the viewer; an error becomes the attribute `data-error` of the canvas.
 pub(crate) fn main() {
@@ -35,7 +36,7 @@ async fn start() -> Result<(), JsValue> {
         }
         None => Source::new(None, TETS),
     };
-    let source = source.map_err(|error| format!("{error:#}"))?;
+    let source = source.map_err(|error| sentence(&error))?;
     let options = WebOptions {
         wgpu_options: graphics::configuration(),
         ..WebOptions::default()
