@@ -3,7 +3,8 @@
 //! Before a face is cut, the tets on both sides are followed through uncut faces until they are found to be more than a
 //! crumb, or to be all of one. A crumb stays with the tet behind the largest of its faces that are to be cut, on the
 //! other side of the cut, and with all others that it touches there where tets around it lead to them without passing
-//! the cut. Its faces to anything else are cut, so a crumb never ties parts that the cut separates. Nothing is taken
+//! the cut. A crumb that touches only crumbs stays with one of these, by one face. Its faces to anything else are cut, so
+//! a crumb never ties parts that the cut separates. Nothing is taken
 //! away: volume, mass and momentum are kept, and the cut runs around the crumb instead. Crumbs stay only with something
 //! several times larger, so that a body of a few tets can be cut.
 //!
@@ -35,8 +36,18 @@ enum Part {
 struct SmallPart {
     tets: Vec<TetId>,
     is_crumb: bool,
-    /// The faces, seen from its own tets, that are not cut; ascending. `None` before they are asked for.
+    /// The faces to something larger, seen from its own tets, that are not cut; ascending. `None` before they are asked
+    /// for.
     kept: Option<Vec<Face>>,
+    /// The face to another crumb that is not cut. `None` before it is asked for.
+    beside: Option<Option<Face>>,
+}
+
+impl SmallPart {
+    fn is_kept(&self) -> bool {
+        let stays = self.kept.as_ref().is_some_and(|kept| !kept.is_empty());
+        stays || matches!(self.beside, Some(Some(_)))
+    }
 }
 
 /// The known crumbs along a cut.
@@ -64,8 +75,7 @@ impl Crumbs {
 
     /// How many crumbs were kept from coming off, and their volume in m³.
     pub(crate) fn kept(&self, operation: &Operation<'_>) -> (usize, f64) {
-        let keeps = |part: &&SmallPart| part.kept.as_ref().is_some_and(|kept| !kept.is_empty());
-        let kept = self.small.iter().filter(keeps);
+        let kept = self.small.iter().filter(|part| part.is_kept());
         let mesh = &operation.cuttable.mesh;
         let volumes = kept.clone().flat_map(|part| &part.tets);
         (kept.count(), volumes.map(|&tet| mesh.volume(tet)).sum())
@@ -88,18 +98,73 @@ impl Crumbs {
         let (crumb, own) = match parts {
             [Part::Small(crumb), Part::Larger] => (crumb, face),
             [Part::Larger, Part::Small(crumb)] => (crumb, twin),
-            // Of two crumbs beside each other each stays with something larger.
+            // Of two crumbs beside each other each stays with something larger, if it touches that.
+            [Part::Small(one), Part::Small(other)] if one != other => {
+                return self.face_beside(operation, one, is_cut) == Some(face)
+                    || self.face_beside(operation, other, is_cut) == Some(twin);
+            }
             _ => return false,
         };
-        if !self.small[crumb].is_crumb {
-            return false;
-        }
+        let kept = self.kept_faces(operation, crumb, is_cut);
+        kept.binary_search(&own).is_ok()
+    }
+
+    /// The faces that tie a small part to something larger; none if it is no crumb.
+    fn kept_faces(
+        &mut self,
+        operation: &Operation<'_>,
+        crumb: usize,
+        is_cut: &impl Fn(&Operation<'_>, Face) -> bool,
+    ) -> &[Face] {
         if self.small[crumb].kept.is_none() {
-            let kept = self.faces_to_keep(operation, crumb, is_cut);
+            let kept = match self.small[crumb].is_crumb {
+                true => self.faces_to_keep(operation, crumb, is_cut),
+                false => Vec::new(),
+            };
             self.small[crumb].kept = Some(kept);
         }
-        let kept = self.small[crumb].kept.as_ref();
-        kept.is_some_and(|kept| kept.binary_search(&own).is_ok())
+        self.small[crumb].kept.as_deref().unwrap_or_default()
+    }
+
+    /// The face that ties a crumb that touches nothing larger to one that does: the largest.
+    fn face_beside(
+        &mut self,
+        operation: &Operation<'_>,
+        crumb: usize,
+        is_cut: &impl Fn(&Operation<'_>, Face) -> bool,
+    ) -> Option<Face> {
+        if let Some(known) = self.small[crumb].beside {
+            return known;
+        }
+        let mut largest: Option<(f64, Face)> = None;
+        if self.small[crumb].is_crumb && self.kept_faces(operation, crumb, is_cut).is_empty() {
+            let mut faces = self.faces_of(crumb);
+            faces.retain(|&face| is_cut(operation, face));
+            for face in faces {
+                let Behind::Twin(twin) = operation.cuttable.faces.behind(face) else {
+                    continue;
+                };
+                let Part::Small(other) = self.part(operation, twin.tet(), is_cut) else {
+                    continue;
+                };
+                let area = area(operation, face);
+                let is_held = !self.kept_faces(operation, other, is_cut).is_empty();
+                if is_held && largest.is_none_or(|(most, _)| area > most) {
+                    largest = Some((area, face));
+                }
+            }
+        }
+        let beside = largest.map(|(_, face)| face);
+        self.small[crumb].beside = Some(beside);
+        beside
+    }
+
+    /// The faces of the tets of a part; ascending.
+    fn faces_of(&self, part: usize) -> Vec<Face> {
+        let tets = &self.small[part].tets;
+        let mut faces: Vec<Face> = tets.iter().flat_map(|&tet| Face::of(tet)).collect();
+        faces.sort_unstable();
+        faces
     }
 
     /// What a tet is part of once the faces that are to be cut are.
@@ -141,6 +206,7 @@ impl Crumbs {
             tets,
             is_crumb,
             kept: None,
+            beside: None,
         });
         this
     }
@@ -156,9 +222,7 @@ impl Crumbs {
         let tets = self.small[crumb].tets.clone();
         let mut largest: Option<(f64, TetId)> = None;
         let mut outside: Vec<(Face, TetId)> = Vec::new();
-        let mut faces: Vec<Face> = tets.iter().flat_map(|&tet| Face::of(tet)).collect();
-        faces.sort_unstable();
-        for face in faces {
+        for face in self.faces_of(crumb) {
             let Behind::Twin(twin) = operation.cuttable.faces.behind(face) else {
                 continue;
             };
@@ -166,8 +230,7 @@ impl Crumbs {
             {
                 continue;
             }
-            let [a, b, c] = face.particles(mesh).map(|p| mesh.positions[p.index()]);
-            let area = DVec3::cross(b - a, c - a).length();
+            let area = area(operation, face);
             if largest.is_none_or(|(most, _)| area > most) {
                 largest = Some((area, twin.tet()));
             }
@@ -195,6 +258,13 @@ impl Crumbs {
         outside.retain(|(_, tet)| found.contains_key(tet));
         outside.into_iter().map(|(face, _)| face).collect()
     }
+}
+
+/// Twice the area of a face at rest in m².
+fn area(operation: &Operation<'_>, face: Face) -> f64 {
+    let mesh = &operation.cuttable.mesh;
+    let [a, b, c] = face.particles(mesh).map(|p| mesh.positions[p.index()]);
+    DVec3::cross(b - a, c - a).length()
 }
 
 /// The tets behind the faces of a tet that are not to be cut.
