@@ -81,7 +81,8 @@ fn no_particle_ends_a_frame_below_the_ground() {
     }
 }
 
-/// However deep a particle is and whatever the height, it is put on the ground exactly, not by adding the depth.
+/// However deep a particle is and whatever the height, it is put on the ground exactly, not by adding the depth. The
+/// substep is as long as the time in which a depth decays.
 #[test]
 fn particles_end_on_the_ground_to_the_bit() {
     let mut noise = Noise(21);
@@ -93,7 +94,7 @@ fn particles_end_on_the_ground_to_the_bit() {
     let schedule = Schedule::new(&Clustering::none(0), &Coloring::new(Vec::new()));
     let settings = StepSettings {
         colliders: vec![Collider::ground(0.1, 0.0)],
-        ..StepSettings::new(0.01)
+        ..StepSettings::new(0.02)
     };
     solver.step(&schedule, &settings).unwrap();
     assert!((0..depths.len()).all(|p| solver.position(p).z == f64::from(0.1_f32)));
