@@ -20,7 +20,7 @@ use crate::vtk::{read_vtk, read_vtk_file, write_vtk, write_vtk_file};
 use crate::vtu::{read_vtu, write_vtu, write_vtu_file};
 use crate::{MeshFile, MeshIoError};
 
-/// True if [`read`] and [`write`] support the ending of the file name.
+/// True if [`read`] and [`write()`] support the ending of the file name.
 #[must_use]
 pub fn is_mesh(path: &Path) -> bool {
     is_among(path, MESHES)
