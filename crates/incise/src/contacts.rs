@@ -171,6 +171,25 @@ struct Room {
     touches: Vec<Touch>,
 }
 
+impl Room {
+    /// What the detector needs to know for the next `frame_time` s.
+    fn state<'a>(
+        &'a self,
+        mesh: &'a CuttableMesh,
+        pieces: &'a PieceTracker,
+        frame_time: f64,
+    ) -> ContactState<'a> {
+        ContactState {
+            mesh,
+            pieces,
+            positions: &self.positions,
+            velocities: &self.velocities,
+            fixed: &self.fixed,
+            frame_time,
+        }
+    }
+}
+
 /// An error of the detector: it comes with wrong input from this crate only, since the scene was checked.
 fn inconsistent(error: incise_contact::ContactError) -> Error {
     Error::Inconsistent(error.to_string())
@@ -279,14 +298,9 @@ impl Contacts {
     ) -> u32 {
         let start = Instant::now();
         self.read(solver);
-        let parts = self.detector.intervals(&ContactState {
-            mesh,
-            pieces,
-            positions: &self.room.positions,
-            velocities: &self.room.velocities,
-            fixed: &self.room.fixed,
-            frame_time: time,
-        });
+        let parts = self
+            .detector
+            .intervals(&self.room.state(mesh, pieces, time));
         self.room.touches.clear();
         self.milliseconds = milliseconds(start.elapsed());
         parts.min(substeps)
@@ -319,14 +333,7 @@ impl Contacts {
     ) -> Result<(), Error> {
         let start = Instant::now();
         self.read(solver);
-        let update = self.detector.update(&ContactState {
-            mesh,
-            pieces,
-            positions: &self.room.positions,
-            velocities: &self.room.velocities,
-            fixed: &self.room.fixed,
-            frame_time: time,
-        });
+        let update = self.detector.update(&self.room.state(mesh, pieces, time));
         let particles = self.room.positions.len();
         let pairs = self.detector.pairs();
         if update.pairs_changed || pairs.len() != self.pair_colors.vertex_count() {

@@ -130,19 +130,27 @@ fn starts_inside(
 ) -> Vec<Warning> {
     let grounds = usize::from(scene.world.ground.is_some());
     let mut warnings = Vec::new();
-    for &body in &joined.bodies {
-        let of_body = |p: &usize| joined.body_of_particle[*p] as usize == body;
-        let particles = || (0..mesh.positions.len()).filter(of_body);
-        let size = Bounds::around(particles().map(|p| mesh.positions[p])).size();
-        let free = || particles().filter(|&p| !joined.fixed[p]);
+    let mut first = 0;
+    // The particles of a body are consecutive.
+    for of_body in joined.body_of_particle.chunk_by(|a, b| a == b) {
+        let particles = first..first + of_body.len();
+        first = particles.end;
+        let positions = &mesh.positions[particles.clone()];
+        let size = Bounds::around(positions.iter().copied()).size();
+        let is_free = joined.fixed[particles].iter().map(|fixed| !fixed);
+        let free = positions
+            .iter()
+            .zip(is_free)
+            .filter(|(_, is_free)| *is_free);
         for (number, collider) in settings.colliders.iter().enumerate() {
-            let depths = free().map(|p| -collider.distance(mesh.positions[p]).0);
+            let depths = free.clone().map(|(&x, _)| -collider.distance(x).0);
             let depth = depths.fold(0.0, f64::max);
             if depth > STARTING_DEPTH * size.max_element() {
                 let name = match number.checked_sub(grounds) {
                     Some(number) => format!("collider[{number}]"),
                     None => "the ground".into(),
                 };
+                let body = of_body[0] as usize;
                 warnings.push(Warning::of_start_inside(body, depth, &name));
             }
         }

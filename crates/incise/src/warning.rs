@@ -207,7 +207,7 @@ pub(crate) fn box_text(bounds: &Bounds) -> String {
 }
 
 /// The warning about the substeps of bodies, if their expected error is too large. `wanted` is the accuracy that the
-/// scene states; `takes_vbd` whether VBD can solve all that the bodies have.
+/// scene states; the fix is VBD only if `takes_vbd`.
 pub(crate) fn of_substeps(
     bodies: &[usize],
     choice: &Choice,

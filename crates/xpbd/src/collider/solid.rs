@@ -46,7 +46,7 @@ impl<R: Float> Solid<R> {
     pub(crate) fn reach(&self) -> R {
         let length = |v: R::Vector| R::dot(v, v).sqrt();
         match *self {
-            Self::Plane { normal, offset } => length(normal * offset),
+            Self::Plane { offset, .. } => absolute(offset),
             Self::Round {
                 start,
                 axis,
