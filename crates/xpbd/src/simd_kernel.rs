@@ -1005,16 +1005,25 @@ fn symmetric<R: Float, S: Simd>(
     a: &Matrix<R::Lanes<S>>,
     b: &Matrix<R::Lanes<S>>,
 ) -> [R::Lanes<S>; 6] {
-    let mixed =
-        |i: usize, j: usize| (dot::<R, S>(&a[i], &b[j]) + dot::<R, S>(&a[j], &b[i])) * R::HALF;
     [
         dot::<R, S>(&a[0], &b[0]),
         dot::<R, S>(&a[1], &b[1]),
         dot::<R, S>(&a[2], &b[2]),
-        mixed(0, 1),
-        mixed(0, 2),
-        mixed(1, 2),
+        symmetric_entry::<R, S>(a, b, 0, 1),
+        symmetric_entry::<R, S>(a, b, 0, 2),
+        symmetric_entry::<R, S>(a, b, 1, 2),
     ]
+}
+
+/// An entry of [`symmetric`] off the diagonal. A closure would be compiled without the instructions of the kernel.
+#[inline(always)]
+fn symmetric_entry<R: Float, S: Simd>(
+    a: &Matrix<R::Lanes<S>>,
+    b: &Matrix<R::Lanes<S>>,
+    i: usize,
+    j: usize,
+) -> R::Lanes<S> {
+    (dot::<R, S>(&a[i], &b[j]) + dot::<R, S>(&a[j], &b[i])) * R::HALF
 }
 
 /// A matrix times a symmetric one.
