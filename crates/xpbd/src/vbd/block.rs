@@ -14,37 +14,6 @@ pub(super) fn apply<R: Float>(block: &Block<R>, x: R::Vector) -> R::Vector {
     block[0] * a + block[1] * b + block[2] * c
 }
 
-/// The sum of some blocks times the vectors of their columns.
-///
-/// The nine products of a block are two vectors of four lanes and one that is left; where a lane belongs is sorted out
-/// in the end.
-#[inline(always)]
-pub(super) fn row_product<R: Float>(
-    columns: &[u32],
-    blocks: &[Block<R>],
-    x: impl Fn(usize) -> R::Vector,
-) -> R::Vector {
-    let (mut s, mut t, mut u) = ([R::ZERO; 4], [R::ZERO; 4], R::ZERO);
-    for (&column, [a, b, c]) in columns.iter().zip(blocks) {
-        let [x, y, z] = R::components(x(column as usize));
-        let (a, b, c) = (R::components(*a), R::components(*b), R::components(*c));
-        let (first, times) = ([a[0], a[1], a[2], b[0]], [x, x, x, y]);
-        for k in 0..4 {
-            s[k] += first[k] * times[k];
-        }
-        let (second, times) = ([b[1], b[2], c[0], c[1]], [y, y, z, z]);
-        for k in 0..4 {
-            t[k] += second[k] * times[k];
-        }
-        u += c[2] * z;
-    }
-    R::vector(
-        s[0] + (s[3] + t[2]),
-        s[1] + (t[0] + t[3]),
-        s[2] + (t[1] + u),
-    )
-}
-
 /// Adds `u vᵀ`.
 #[inline]
 pub(super) fn add_outer<R: Float>(block: &mut Block<R>, u: R::Vector, v: R::Vector) {

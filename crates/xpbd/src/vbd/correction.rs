@@ -270,13 +270,14 @@ impl<R: Float> ImplicitStep<'_, R> {
         }
         force.clear();
         force.resize(rows, R::Vector::default());
+        let colors = &self.stars.data.colors;
         let mut is_kept = self.accuracy.is_some()
             && matches!(&*filled, Some((time, rows)) if *time == self.time && rows == held);
         if is_kept {
             matrix.forces(self.solver, self.stars, self.time, held, force);
         } else {
             matrix.fill(self.solver, self.stars, self.time, held, force);
-            conjugate.prepare(matrix, held);
+            conjugate.prepare(matrix, colors, held);
             *filled = Some((self.time, held.clone()));
         }
         if coarse.is_stale(*is_cut) {
@@ -288,6 +289,7 @@ impl<R: Float> ImplicitStep<'_, R> {
                 *coarse = Coarse::new(of, count);
             }
             coarse.place(|row| R::to_dvec3(base[row]));
+            matrix.mirror();
             coarse.assemble(matrix, held);
         }
         let start = self.potentials();
@@ -309,14 +311,13 @@ impl<R: Float> ImplicitStep<'_, R> {
             reduction: settings.reduction,
             energy: |gain: f64| accuracy * accuracy * energy(gain),
         };
-        let colors = &self.stars.data.colors;
-        let mut solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
+        let mut solved = conjugate.solve(coarse, force, held, &limits);
         let is_violent = |slope: f64| 0.5 * slope > CALM * energy(0.5 * slope);
         if is_kept && is_violent(solved.slope) {
             is_kept = false;
             matrix.fill(self.solver, self.stars, self.time, held, force);
-            conjugate.prepare(matrix, held);
-            solved = conjugate.solve(matrix, coarse, colors, force, held, &limits);
+            conjugate.prepare(matrix, colors, held);
+            solved = conjugate.solve(coarse, force, held, &limits);
         }
         coarse.note(solved.iterations, solved.left);
         self.stars.try_start |= solved.iterations > FEWEST_ITERATIONS;

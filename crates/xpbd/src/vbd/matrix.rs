@@ -1,14 +1,13 @@
 //! [`Blocks`]: a symmetric matrix with one 3×3 block for each pair of particles with a common tet.
 //!
 //! Rows and columns follow the solving order of the stars, so colors are contiguous. The part right of the diagonal is a
-//! copy of the left part. Cost: 9 numbers an edge and direction; a product is twice as many operations as numbers.
+//! copy of the left part, for those who call [`Blocks::mirror`]. Cost: 9 numbers an edge and direction; a product is twice as many operations as numbers.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::PARALLEL_ROWS;
-use super::block::{Block, row_product};
+use super::block::Block;
 use super::row_slices::threads_for;
 use super::stars::StarData;
 use crate::wide::wide;
@@ -23,8 +22,8 @@ pub(super) struct Blocks<R: Float> {
     pub(super) offsets: Vec<usize>,
     /// Where the blocks right of the diagonal begin in each row.
     pub(super) upper: Vec<usize>,
-    /// Where the transpose of each block right of the diagonal is, row by row.
-    mirrors: Vec<u32>,
+    /// Where the values of each block are: itself, or its transpose left of the diagonal.
+    pub(super) sources: Vec<u32>,
     /// The column of each block; the diagonal comes first in its row, the others ascend.
     pub(super) columns: Vec<u32>,
     pub(super) blocks: Vec<Block<R>>,
@@ -34,6 +33,8 @@ pub(super) struct Blocks<R: Float> {
     pub(super) excess: Vec<R>,
     /// That of the stars whose pattern it has.
     revision: u64,
+    /// Number of patterns so far.
+    pub(super) patterns: u64,
 }
 
 /// The pattern of consecutive rows.
@@ -90,7 +91,7 @@ impl<R: Float> Blocks<R> {
     pub(super) fn bytes(&self) -> usize {
         size_of_val(&*self.offsets)
             + size_of_val(&*self.upper)
-            + size_of_val(&*self.mirrors)
+            + size_of_val(&*self.sources)
             + size_of_val(&*self.columns)
             + size_of_val(&*self.blocks)
             + size_of_val(&*self.block_indices)
@@ -99,18 +100,24 @@ impl<R: Float> Blocks<R> {
 
     /// The pattern of some stars; no values yet. O(pairs + blocks log valence).
     pub(super) fn new(stars: &StarData<R>) -> Self {
-        let mut blocks = Self {
-            offsets: Vec::new(),
+        let mut blocks = Self::empty();
+        blocks.sync(stars);
+        blocks
+    }
+
+    /// A matrix without rows.
+    pub(super) fn empty() -> Self {
+        Self {
+            offsets: vec![0],
             upper: Vec::new(),
-            mirrors: Vec::new(),
+            sources: Vec::new(),
             columns: Vec::new(),
             blocks: Vec::new(),
             block_indices: Vec::new(),
             excess: Vec::new(),
             revision: 0,
-        };
-        blocks.sync(stars);
-        blocks
+            patterns: 0,
+        }
     }
 
     /// Takes the pattern of other stars; memory is used again, and values are undefined until they are filled.
@@ -119,11 +126,12 @@ impl<R: Float> Blocks<R> {
         let Self {
             offsets,
             upper,
-            mirrors,
+            sources,
             columns,
             blocks,
             block_indices,
             revision,
+            patterns: count,
             ..
         } = self;
         let rows = stars.order.len();
@@ -161,6 +169,7 @@ impl<R: Float> Blocks<R> {
             patterns.collect()
         };
         *revision = stars.revision;
+        *count += 1;
         offsets.clear();
         offsets.push(0);
         upper.clear();
@@ -178,46 +187,41 @@ impl<R: Float> Blocks<R> {
         blocks.resize(columns.len(), [R::Vector::default(); 3]);
         // Rows come in ascending order, so the transposes in a row are met from its first block on.
         let mut next: Vec<usize> = offsets[..rows].iter().map(|first| first + 1).collect();
-        mirrors.clear();
+        sources.clear();
+        let number = |block: usize| u32::try_from(block).expect("blocks are numbered in 32 bits");
         for (row, &from) in upper.iter().enumerate() {
+            sources.extend((offsets[row]..from).map(number));
             for &column in &columns[from..offsets[row + 1]] {
                 let block = &mut next[column as usize];
-                mirrors.push(u32::try_from(*block).expect("blocks are numbered in 32 bits"));
+                sources.push(number(*block));
                 *block += 1;
             }
         }
     }
 
-    /// Copies what is left of the diagonal to its right, but in rows of particles that are held.
-    pub(super) fn mirror(&mut self, held: &[bool]) {
-        let mut mirrors = self.mirrors.iter();
-        for (row, &held) in held.iter().enumerate() {
-            let right = self.upper[row]..self.offsets[row + 1];
-            for (block, &mirror) in right.zip(&mut mirrors) {
-                if !held {
-                    let [a, b, c] = self.blocks[mirror as usize].map(R::components);
-                    self.blocks[block] = [
-                        R::vector(a[0], b[0], c[0]),
-                        R::vector(a[1], b[1], c[1]),
-                        R::vector(a[2], b[2], c[2]),
-                    ];
-                }
+    /// Copies what is left of the diagonal to its right.
+    pub(super) fn mirror(&mut self) {
+        for row in 0..self.upper.len() {
+            for block in self.upper(row) {
+                let [a, b, c] = self.blocks[self.sources[block] as usize].map(R::components);
+                self.blocks[block] = [
+                    R::vector(a[0], b[0], c[0]),
+                    R::vector(a[1], b[1], c[1]),
+                    R::vector(a[2], b[2], c[2]),
+                ];
             }
         }
     }
 
-    /// `y = A x`.
+    /// `y = A x`, row by row.
+    #[cfg(test)]
     pub(super) fn multiply(&self, x: &[R::Vector], y: &mut [R::Vector]) {
-        each_row(
-            y,
-            PARALLEL_ROWS,
-            #[inline(always)]
-            |row| {
-                let all = self.offsets[row]..self.offsets[row + 1];
-                let (columns, blocks) = (&self.columns[all.clone()], &self.blocks[all]);
-                row_product::<R>(columns, blocks, |column| x[column])
-            },
-        );
+        for (row, y) in y.iter_mut().enumerate() {
+            *y = R::Vector::default();
+            for (column, block) in self.row(row) {
+                *y += super::block::apply::<R>(block, x[column]);
+            }
+        }
     }
 
     /// The blocks of a row left of the diagonal.
@@ -238,7 +242,7 @@ impl<R: Float> Blocks<R> {
         let rebuilt = Self::new(stars);
         let is_same = self.offsets == rebuilt.offsets
             && self.upper == rebuilt.upper
-            && self.mirrors == rebuilt.mirrors
+            && self.sources == rebuilt.sources
             && self.columns == rebuilt.columns
             && self.block_indices == rebuilt.block_indices
             && self.blocks.len() == rebuilt.blocks.len();

@@ -39,6 +39,7 @@ mod start;
 mod state;
 mod step;
 mod sweep;
+mod triangle;
 mod vertex_stars;
 mod viscosity;
 

@@ -1,123 +1,129 @@
 //! [`Smoother`]: symmetric Gauss-Seidel sweeps over the rows of a matrix, in the colors of the stars.
 //!
-//! Cost of a cycle: the blocks left of the diagonal twice, those right of it twice.
+//! Both triangles of the matrix are kept in slices of rows (`triangle`). The half sweeps share products: a sweep from
+//! zero leaves nothing but what is right of the diagonal, the sweep backwards needs what is left of it once, before it
+//! begins, and with what the sweep backwards has added up the whole matrix times the result is half a product.
+//!
+//! Cost of a cycle: the blocks left of the diagonal twice, those right of it twice; the product, once more the left.
 
-use std::ops::Range;
-
-use glam::DVec3;
 use rayon::prelude::*;
 
 use super::PARALLEL_ROWS;
-use super::block::{Block, apply, row_product, solve};
-use super::matrix::{Blocks, each_row};
+use super::block::{Block, apply, solve};
+use super::matrix::Blocks;
+use super::triangle::Triangle;
 use crate::Float;
 use crate::float::finite;
-
-/// Rows of a color that a thread relaxes at a time. Waking a thread costs as much as some hundred of them.
-const PARALLEL_RELAXED: usize = 512;
+use glam::DVec3;
 
 /// Last digits of the trace that rounding may have taken from the pivots of a diagonal block.
 const ROUNDING: f64 = 4.0;
 
-/// Inverses of the diagonal blocks of a matrix, and what the first half of a cycle has left over.
+/// Inverses of the diagonal blocks of a matrix, its triangles, and what the halves of a cycle leave for later.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(bound = ""))]
 pub(super) struct Smoother<R: Float> {
-    /// The inverse of the diagonal block of each row.
+    /// The diagonal block of each row, and its inverse.
+    diagonals: Vec<Block<R>>,
     inverses: Vec<Block<R>>,
+    lower: Triangle<R>,
+    upper: Triangle<R>,
+    /// The pattern that the triangles have, by its number.
+    pattern: u64,
+    /// What the first half of a cycle has left over.
     residual: Vec<R::Vector>,
+    /// The products left of the diagonal with the unknowns before the second half, and those right of it after.
+    products: Vec<R::Vector>,
 }
 
 impl<R: Float> Smoother<R> {
     /// Bytes of all lists.
     pub(super) fn bytes(&self) -> usize {
-        size_of_val(&*self.inverses) + size_of_val(&*self.residual)
+        size_of_val(&*self.diagonals)
+            + size_of_val(&*self.inverses)
+            + size_of_val(&*self.residual)
+            + size_of_val(&*self.products)
+            + self.lower.bytes()
+            + self.upper.bytes()
     }
 
-    /// Takes the values of a matrix. Rows that are held get no inverse, so their unknowns stay zero.
-    pub(super) fn prepare(&mut self, matrix: &Blocks<R>, held: &[bool]) {
+    /// Takes the values of a matrix with rows in these colors. Rows that are held get no inverse, so their unknowns
+    /// stay zero.
+    pub(super) fn prepare(&mut self, matrix: &Blocks<R>, colors: &[usize], held: &[bool]) {
+        if self.pattern != matrix.patterns {
+            self.lower.sync(matrix, colors, |row| matrix.lower(row));
+            self.upper.sync(matrix, colors, |row| matrix.upper(row));
+            self.pattern = matrix.patterns;
+        }
+        self.lower.fill::<false>(matrix);
+        self.upper.fill::<true>(matrix);
+        let diagonal = |&first: &usize| matrix.blocks[first];
+        self.diagonals.clear();
+        self.diagonals
+            .extend(matrix.offsets[..held.len()].iter().map(diagonal));
         (0..held.len())
             .into_par_iter()
             .with_min_len(PARALLEL_ROWS)
-            .map(|row| inverse::<R>(&matrix.blocks[matrix.offsets[row]], held[row]))
+            .map(|row| inverse::<R>(&self.diagonals[row], held[row]))
             .collect_into_vec(&mut self.inverses);
         self.residual.resize(held.len(), R::Vector::default());
+        self.products.resize(held.len(), R::Vector::default());
     }
 
     /// The first half of a cycle for the right side `b`: sets the unknowns `z` by a sweep through all colors, from zero,
     /// and returns what that leaves over of each row.
-    pub(super) fn forward(
-        &mut self,
-        matrix: &Blocks<R>,
-        colors: &[usize],
-        b: &[R::Vector],
-        z: &mut [R::Vector],
-    ) -> &[R::Vector] {
-        let inverses = &self.inverses;
+    pub(super) fn forward(&mut self, b: &[R::Vector], z: &mut [R::Vector]) -> &[R::Vector] {
+        let Self {
+            inverses,
+            lower,
+            upper,
+            residual,
+            ..
+        } = self;
         // From zero, nothing right of the diagonal matters yet, and nothing but that is left over afterwards.
-        for color in colors.windows(2) {
-            let (before, rest) = z.split_at_mut(color[0]);
-            each_row(
-                &mut rest[..color[1] - color[0]],
-                PARALLEL_RELAXED,
-                #[inline(always)]
-                |k| {
-                    let row = color[0] + k;
-                    let lower = product(matrix, matrix.lower(row), before, 0);
-                    apply::<R>(&inverses[row], b[row] - lower)
-                },
-            );
+        for color in 0..lower.color_count() {
+            lower.relax(color, z, |z, row, lower| {
+                z[row] = apply::<R>(&inverses[row], b[row] - lower);
+            });
         }
-        each_row(
-            &mut self.residual,
-            PARALLEL_ROWS,
-            #[inline(always)]
-            |row| -product(matrix, matrix.upper(row), z, 0),
-        );
-        &self.residual
+        upper.product(z, |row, upper| residual[row] = -upper);
+        residual
     }
 
     /// The second half: a sweep through all colors backwards.
-    pub(super) fn backward(
-        &self,
-        matrix: &Blocks<R>,
-        colors: &[usize],
-        b: &[R::Vector],
-        z: &mut [R::Vector],
-    ) {
-        let inverses = &self.inverses;
-        for color in colors.windows(2).rev() {
-            let (before, rest) = z.split_at_mut(color[0]);
-            let (own, after) = rest.split_at_mut(color[1] - color[0]);
-            let (before, after) = (&*before, &*after);
-            each_row(
-                own,
-                PARALLEL_RELAXED,
-                #[inline(always)]
-                |k| {
-                    let row = color[0] + k;
-                    let lower = product(matrix, matrix.lower(row), before, 0);
-                    let upper = product(matrix, matrix.upper(row), after, color[1]);
-                    apply::<R>(&inverses[row], b[row] - (lower + upper))
-                },
-            );
+    pub(super) fn backward(&mut self, b: &[R::Vector], z: &mut [R::Vector]) {
+        let Self {
+            inverses,
+            lower,
+            upper,
+            products,
+            ..
+        } = self;
+        // The sweep meets what is left of the diagonal before it has changed.
+        lower.product(z, |row, lower| products[row] = lower);
+        for color in (0..upper.color_count()).rev() {
+            upper.relax(color, z, |z, row, upper| {
+                z[row] = apply::<R>(&inverses[row], b[row] - (products[row] + upper));
+                products[row] = upper;
+            });
         }
     }
-}
 
-/// Some blocks of a row times the unknowns of their columns, of which `z` has those from `first` on.
-#[inline(always)]
-fn product<R: Float>(
-    matrix: &Blocks<R>,
-    range: Range<usize>,
-    z: &[R::Vector],
-    first: usize,
-) -> R::Vector {
-    let (columns, blocks) = (&matrix.columns[range.clone()], &matrix.blocks[range]);
-    row_product::<R>(columns, blocks, |column| z[column - first])
+    /// The whole matrix times the unknowns `z` that [`Smoother::backward`] has set; undefined in rows that are held.
+    pub(super) fn multiply(&mut self, z: &[R::Vector], out: &mut [R::Vector]) {
+        let Self {
+            diagonals,
+            lower,
+            products,
+            ..
+        } = self;
+        lower.product(z, |row, lower| {
+            let diagonal = apply::<R>(&diagonals[row], z[row]);
+            out[row] = diagonal + (lower + products[row]);
+        });
+    }
 }
-
 /// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal,
 /// so that it is as positive as the block was before rounding; zero if it has none or the row is held.
 fn inverse<R: Float>(block: &Block<R>, held: bool) -> Block<R> {
