@@ -221,6 +221,7 @@ mod tests {
     use incise_graph::{Clustering, ColorId, Coloring, Schedule};
 
     use super::*;
+    use crate::vbd::smoother::Smoother;
     use crate::{DistanceConstraint, ImplicitStep, Material, Pose, VbdSettings};
 
     /// Where no pressure is held back (a body stretched a little), the matrix is the second derivative of the
@@ -275,6 +276,20 @@ mod tests {
             assert!((forces[row] - exact[p as usize]).length() < 1e-11 * stuff.young_modulus);
         }
         let mut product = vec![DVec3::ZERO; 5];
+        // What a cycle of the smoother says of the matrix times its result, against all rows.
+        let mut smoother = Smoother::default();
+        smoother.prepare(&blocks, &[0, 1, 2, 3, 4, 5], &[false; 5]);
+        let (mut result, mut image) = (vec![DVec3::ZERO; 5], vec![DVec3::ZERO; 5]);
+        smoother.forward(&forces, &mut result);
+        for (k, x) in (1u8..).zip(&mut result) {
+            *x += DVec3::new(1e-3, -2e-3, 3e-3) * f64::from(k);
+        }
+        smoother.backward(&forces, &mut result);
+        smoother.multiply(&result, &mut image);
+        blocks.multiply(&result, &mut product);
+        for (image, product) in image.iter().zip(&product) {
+            assert!((*image - *product).length() < 1e-12 * product.length().max(1.0));
+        }
         for (column, &q) in order.iter().enumerate() {
             for axis in DVec3::AXES {
                 let mut motion = vec![DVec3::ZERO; 5];
