@@ -23,7 +23,7 @@
 //! quarter.
 
 use glam::DVec3;
-use incise_cutting::{CutDelta, CuttableMesh};
+use incise_cutting::{BoundaryTriangle, CutDelta, CuttableMesh};
 use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
@@ -31,7 +31,7 @@ use crate::ContactError;
 use crate::edges::{EdgeContact, FeatureEdges, turn};
 use crate::face::FaceContact;
 use crate::index::{NONE, index};
-use crate::normals::Shape;
+use crate::normals::{Owner, PlacedTriangle, Shape};
 use crate::pairs::{FreshPairs, PairContact};
 use crate::parts::Part;
 use crate::query::{Found, Query};
@@ -169,8 +169,7 @@ pub struct ContactDetector {
 #[derive(Clone, Debug, Default)]
 struct Room {
     boxes: Vec<Box32>,
-    normals: Vec<DVec3>,
-    areas: Vec<DVec3>,
+    placed: Vec<PlacedTriangle>,
     found: Vec<Found>,
     last_faces: Vec<FaceContact>,
     last_edges: Vec<EdgeContact>,
@@ -250,8 +249,8 @@ impl ContactDetector {
 
     /// Drops what refers to the surface of before.
     fn forget(&mut self) {
-        self.main.build(std::iter::empty(), &[], &[]);
-        self.fresh.build(std::iter::empty(), &[], &[]);
+        self.main.clear();
+        self.fresh.clear();
         self.main_slots = 0;
         self.fresh_is_due = true;
         self.search_is_due = true;
@@ -622,26 +621,19 @@ impl ContactDetector {
 
     /// Boxes and normals of the triangles at the present positions.
     fn prepare_slots(&mut self, state: &ContactState<'_>) {
-        let Room {
-            boxes,
-            normals,
-            areas,
-            ..
-        } = &mut self.room;
+        let Room { boxes, placed, .. } = &mut self.room;
         let count = self.surface.slot_count();
         boxes.resize(count, Box32::EMPTY);
-        normals.resize(count, DVec3::ZERO);
-        areas.resize(count, DVec3::ZERO);
-        let surface = &self.surface;
-        type Slot<'a> = ((&'a mut Box32, &'a mut DVec3), &'a mut DVec3);
-        let prepare = |(slot, ((bounds, normal), area)): (usize, Slot<'_>)| {
-            (*bounds, *normal, *area) = prepared(surface, state, index(slot));
+        placed.resize(count, PlacedTriangle::default());
+        let (surface, body_of) = (&self.surface, &self.body_of);
+        let prepare = |(slot, (bounds, placed)): (usize, (&mut Box32, &mut PlacedTriangle))| {
+            (*bounds, *placed) = prepared(surface, body_of, state, index(slot));
         };
         if count < 2 * PARALLEL {
-            let slots = boxes.iter_mut().zip(normals).zip(areas).enumerate();
+            let slots = boxes.iter_mut().zip(placed).enumerate();
             slots.for_each(prepare);
         } else {
-            let slots = boxes.par_iter_mut().zip(normals).zip(areas).enumerate();
+            let slots = boxes.par_iter_mut().zip(placed).enumerate();
             slots.with_min_len(PARALLEL).for_each(prepare);
         }
     }
@@ -656,42 +648,42 @@ impl ContactDetector {
             self.prepare_slots(state);
             self.features_are_due = true;
             self.main_slots = self.surface.slot_count();
-            let Room { boxes, normals, .. } = &self.room;
-            self.main.build(0..index(self.main_slots), boxes, normals);
-            self.fresh.build(std::iter::empty(), &[], &[]);
+            let Room { boxes, placed, .. } = &self.room;
+            let (normal_of, part_of) = by_slot(placed);
+            let all = 0..index(self.main_slots);
+            self.main.build(all, boxes, normal_of, part_of);
+            self.fresh.clear();
             self.fresh_is_due = false;
             return;
         }
-        let Room { boxes, normals, .. } = &self.room;
-        self.main.refit(boxes, normals);
+        let Room { boxes, placed, .. } = &self.room;
+        let (normal_of, part_of) = by_slot(placed);
+        self.main.refit(boxes, normal_of);
         if self.fresh_is_due {
             let new = index(self.main_slots)..index(slots);
             let alive = new.filter(|&slot| self.surface.is_alive(slot));
-            self.fresh.build(alive, boxes, normals);
+            self.fresh.build(alive, boxes, normal_of, part_of);
             self.fresh_is_due = false;
         } else {
-            self.fresh.refit(boxes, normals);
+            self.fresh.refit(boxes, normal_of);
         }
     }
 
     /// Searches for each vertex and each feature edge.
     fn query(&mut self, state: &ContactState<'_>) {
         let Room {
-            normals,
-            areas,
+            placed,
             found,
             parts,
             ..
         } = &mut self.room;
-        let (normals, areas) = (&*normals, &*areas);
         let query = Query {
             state,
             settings: &self.settings,
             shape: Shape {
                 surface: &self.surface,
                 positions: state.positions,
-                normals,
-                areas,
+                placed,
             },
             trees: [&self.main, &self.fresh],
             pairs: &self.fresh_pairs,
@@ -928,29 +920,46 @@ struct Moved {
     needed: f64,
 }
 
-/// The box, the unit normal and the area vector of a triangle; the empty box and no normal if it must not be touched. The
-/// box is that of the tet behind it, so that the search also says which tets may contain a vertex.
+/// The box of a triangle and the triangle at the present positions; the empty box and no normal if it must not be touched.
+/// The box is that of the tet behind it, so that the search also says which tets may contain a vertex.
 fn prepared(
     surface: &ContactSurface,
+    body_of: &[u32],
     state: &ContactState<'_>,
     slot: u32,
-) -> (Box32, DVec3, DVec3) {
+) -> (Box32, PlacedTriangle) {
     if !surface.is_alive(slot) {
-        return (Box32::EMPTY, DVec3::ZERO, DVec3::ZERO);
+        return (Box32::EMPTY, PlacedTriangle::default());
     }
-    let area = surface.area(slot, state.positions);
-    let nothing = (Box32::EMPTY, DVec3::ZERO, area);
-    let tet = surface.triangle(slot).tet;
+    let BoundaryTriangle { tet, particles, .. } = *surface.triangle(slot);
+    let mut placed = PlacedTriangle {
+        normal: DVec3::ZERO,
+        area: surface.area(slot, state.positions),
+        corners: particles.map(|p| state.positions[p.index()]),
+        owner: Owner {
+            body: body_of[particles[0].index()],
+            piece: state.pieces.piece_of(tet),
+        },
+    };
     let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
-    if !Barycentric::exist(corners) {
-        return nothing;
+    let squared = placed.area.length_squared();
+    if !Barycentric::exist(corners) || surface.is_collapsed(slot, squared) {
+        return (Box32::EMPTY, placed);
     }
-    let squared = area.length_squared();
-    if surface.is_collapsed(slot, squared) {
-        return nothing;
-    }
-    let bounds = Bounds::around(corners);
-    (Box32::around(&bounds), area / squared.sqrt(), area)
+    placed.normal = placed.area / squared.sqrt();
+    (Box32::around(&Bounds::around(corners)), placed)
+}
+
+/// What a tree asks of triangles, by slot: their normals and their pieces.
+fn by_slot(
+    placed: &[PlacedTriangle],
+) -> (
+    impl Fn(u32) -> DVec3 + Copy + '_,
+    impl Fn(u32) -> u32 + Copy + '_,
+) {
+    let normal_of = |slot: u32| placed[slot as usize].normal;
+    let part_of = |slot: u32| placed[slot as usize].owner.piece;
+    (normal_of, part_of)
 }
 
 /// A tree over all tets that are not flat or inverted, by their numbers. O(n log n).
@@ -966,7 +975,7 @@ fn tree_of_tets(state: &ContactState<'_>) -> TriangleTree {
     });
     let boxes: Vec<Box32> = boxes.collect();
     let mut tree = TriangleTree::default();
-    tree.build(0..index(boxes.len()), &boxes, &[]);
+    tree.build(0..index(boxes.len()), &boxes, |_| DVec3::ZERO, |_| 0);
     tree
 }
 

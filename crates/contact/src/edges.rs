@@ -254,10 +254,10 @@ impl FeatureEdges {
             }
         }));
         if self.tree_is_due {
-            tree.build(0..index(edges.len()), boxes, &[]);
+            tree.build(0..index(edges.len()), boxes, |_| DVec3::ZERO, |_| 0);
             self.tree_is_due = false;
         } else {
-            tree.refit(boxes, &[]);
+            tree.refit(boxes, |_| DVec3::ZERO);
         }
         self.found
             .resize_with(edges.len().div_ceil(CHUNK), Vec::new);

@@ -11,16 +11,32 @@ use incise_mesh::TrianglePart;
 
 use crate::surface::ContactSurface;
 
+/// The body and the piece of a triangle.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Owner {
+    pub(crate) body: u32,
+    pub(crate) piece: u32,
+}
+
+/// A triangle at the present positions: what a search reads of it, side by side.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PlacedTriangle {
+    /// Of unit length; zero for an empty slot and for a triangle that must not be touched, because it has collapsed or its
+    /// tet is inverted.
+    pub(crate) normal: DVec3,
+    /// See [`ContactSurface::area`]; of use where there is a triangle.
+    pub(crate) area: DVec3,
+    pub(crate) corners: [DVec3; 3],
+    pub(crate) owner: Owner,
+}
+
 /// A surface at the present positions.
 #[derive(Clone, Copy)]
 pub(crate) struct Shape<'a> {
     pub(crate) surface: &'a ContactSurface,
     pub(crate) positions: &'a [DVec3],
-    /// By slot the unit normal; zero for an empty slot and for a triangle that must not be touched, because it has
-    /// collapsed or its tet is inverted.
-    pub(crate) normals: &'a [DVec3],
-    /// By slot the area vector, see [`ContactSurface::area`]; of use where there is a triangle.
-    pub(crate) areas: &'a [DVec3],
+    /// By slot.
+    pub(crate) placed: &'a [PlacedTriangle],
 }
 
 impl<'a> Shape<'a> {
@@ -29,16 +45,19 @@ impl<'a> Shape<'a> {
     }
 
     pub(crate) fn normal(&self, slot: u32) -> DVec3 {
-        self.normals[slot as usize]
+        self.placed[slot as usize].normal
     }
 
     pub(crate) fn is_sound(&self, slot: u32) -> bool {
-        self.normals[slot as usize] != DVec3::ZERO
+        self.normal(slot) != DVec3::ZERO
     }
 
     pub(crate) fn corners(&self, slot: u32) -> [DVec3; 3] {
-        let particles = self.triangle(slot).particles;
-        particles.map(|p| self.positions[p.index()])
+        self.placed[slot as usize].corners
+    }
+
+    pub(crate) fn owner(&self, slot: u32) -> Owner {
+        self.placed[slot as usize].owner
     }
 
     /// The sound triangles that share a part with a triangle, itself included, each with its corner at the part (for a
@@ -106,14 +125,19 @@ mod tests {
         let positions = &body.mesh().positions;
         let surface = ContactSurface::new(&body);
         let slots = 0..u32::try_from(surface.slot_count()).unwrap();
-        let normals: Vec<DVec3> = slots
-            .map(|slot| surface.area(slot, positions).normalize())
-            .collect();
+        let placed = slots.map(|slot| PlacedTriangle {
+            normal: surface.area(slot, positions).normalize(),
+            corners: surface
+                .triangle(slot)
+                .particles
+                .map(|p| positions[p.index()]),
+            ..PlacedTriangle::default()
+        });
+        let placed: Vec<PlacedTriangle> = placed.collect();
         let shape = Shape {
             surface: &surface,
             positions,
-            normals: &normals,
-            areas: &[],
+            placed: &placed,
         };
         let particle = |x: DVec3| ParticleId::new(positions.iter().position(|p| *p == x).unwrap());
         let top = particle(DVec3::ONE);

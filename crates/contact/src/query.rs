@@ -24,7 +24,7 @@ use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest
 
 use crate::face::{FaceContact, Meeting, face_contact};
 use crate::index::NONE;
-use crate::normals::Shape;
+use crate::normals::{Owner, Shape};
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
@@ -37,6 +37,8 @@ const FACING: f64 = 0.2;
 const FACING_SINGLE: f32 = 0.2 + 1e-5;
 /// Distances that differ by this, in mean edges, are the same.
 const SAME: f64 = 1e-9;
+/// What rounding adds to a distance at most, as a part of it.
+const ROUNDING: f64 = 1e-9;
 /// Up to this distance in mean edges a vertex counts as touching an edge or a vertex.
 const TOUCHING: f64 = 0.01;
 /// A vertex counts as inside another part if the point this far behind it, in mean edges, is: what merely touches is
@@ -178,7 +180,7 @@ impl VertexNormals {
                 this.normals[this.count - 1].0 = tag;
                 this.count - 1
             });
-            this.normals[place].1 += shape.areas[slot as usize];
+            this.normals[place].1 += shape.placed[slot as usize].area;
         }
         for k in 0..this.count {
             let normal = &mut this.normals[k].1;
@@ -353,18 +355,25 @@ impl Query<'_> {
 
     /// Whether the vertex may touch a triangle: it is no corner of it and their bodies may touch.
     fn may_touch(&self, vertex: &Vertex<'_>, slot: u32) -> bool {
-        let triangle = self.shape.triangle(slot);
-        !triangle.particles.contains(&vertex.id) && self.may_touch_part(vertex, triangle.tet)
+        self.may_touch_owner(vertex, self.shape.owner(slot))
+            && !self.shape.triangle(slot).particles.contains(&vertex.id)
+    }
+
+    fn may_touch_owner(&self, vertex: &Vertex<'_>, owner: Owner) -> bool {
+        if owner.body == vertex.body {
+            self.settings.self_contact || owner.piece != vertex.piece
+        } else {
+            self.settings.bodies.allow(owner.body, vertex.body)
+        }
     }
 
     fn may_touch_part(&self, vertex: &Vertex<'_>, tet: TetId) -> bool {
-        let corners = self.state.mesh.mesh().tets[tet.index()];
-        let body = self.body_of[corners[0].index()];
-        if body == vertex.body {
-            self.settings.self_contact || self.state.pieces.piece_of(tet) != vertex.piece
-        } else {
-            self.settings.bodies.allow(body, vertex.body)
-        }
+        let [first, ..] = self.state.mesh.mesh().tets[tet.index()];
+        let owner = Owner {
+            body: self.body_of[first.index()],
+            piece: self.state.pieces.piece_of(tet),
+        };
+        self.may_touch_owner(vertex, owner)
     }
 
     /// Whether the parts of two tets may touch.
@@ -387,7 +396,12 @@ impl Query<'_> {
             return None;
         }
         let x = vertex.x;
-        let ClosestPoint { point, part, .. } = closest_on_triangle(self.shape.corners(slot), x);
+        let corners = self.shape.corners(slot);
+        // The plane is no further than the triangle.
+        if face.dot(x - corners[0]).abs() > self.reach * (1.0 + ROUNDING) {
+            return None;
+        }
+        let ClosestPoint { point, part, .. } = closest_on_triangle(corners, x);
         let squared = point.distance_squared(x);
         if squared > self.reach * self.reach || squared.is_nan() {
             return None;

@@ -1,12 +1,15 @@
 //! [`TriangleTree`]: boxes of triangles in a binary tree that is refitted as they move.
 //!
-//! Built by halving at the median center along the longest axis, four triangles a leaf, nodes in the order of a walk
+//! Built by halving at the median center along the longest axis, first among the pieces of bodies, so that boxes stay
+//! small while pieces pass each other, then among the triangles of each, four a leaf, nodes in the order of a walk
 //! with the node to skip to. A search needs no stack. Boxes are in single precision, rounded outward, so that half the
 //! memory is read and nothing is missed. Its results are a set: their order is the tree's own. What most searches look at
 //! of a triangle, its box and its normal, lies beside those of the others of its leaf. A node also has a box around the
 //! normals below it, so that a search may leave out whole patches that face the wrong way.
 //!
 //! Cost: O(n log n) to build, O(n) to refit, O(log n + found) a search.
+
+use std::ops::Range;
 
 use glam::{DVec3, Vec3};
 use incise_mesh::Bounds;
@@ -63,10 +66,21 @@ impl Box32 {
         along(0) & along(1) & along(2)
     }
 
+    fn longest_axis(&self) -> usize {
+        let size = [0, 1, 2].map(|k| f64::from(self.high[k]) - f64::from(self.low[k]));
+        DVec3::from_array(size).max_position()
+    }
+
     /// The sum of both ends along an axis: orders boxes as their centers do.
     fn center(&self, axis: usize) -> f64 {
         f64::from(self.low[axis]) + f64::from(self.high[axis])
     }
+}
+
+/// The box around those of numbers.
+fn around(numbers: &[u32], boxes: &[Box32]) -> Box32 {
+    let all = numbers.iter().map(|&number| boxes[number as usize]);
+    all.fold(Box32::EMPTY, Box32::union)
 }
 
 /// The largest number of single precision not above `x`.
@@ -122,41 +136,75 @@ pub(crate) struct TriangleTree {
 }
 
 impl TriangleTree {
-    /// Builds it over the triangles whose numbers are given, in the memory it has. Boxes and normals are by number; what
-    /// has no normals has none at all.
+    /// Builds it over the triangles whose numbers are given, in the memory it has. Boxes are by number. Triangles of
+    /// different parts share no leaf, and only nodes above all of both.
     pub(crate) fn build(
         &mut self,
         numbers: impl Iterator<Item = u32>,
         boxes: &[Box32],
-        normals: &[DVec3],
+        normal_of: impl Fn(u32) -> DVec3,
+        part_of: impl Fn(u32) -> u32,
     ) {
         self.order.clear();
         self.order.extend(numbers);
         self.nodes.clear();
-        if !self.order.is_empty() {
-            self.split(0, self.order.len(), boxes);
+        self.order
+            .sort_unstable_by_key(|&number| (part_of(number), number));
+        let mut parts: Vec<(Range<usize>, Box32)> = Vec::new();
+        let mut first = 0;
+        for same in self.order.chunk_by(|&i, &j| part_of(i) == part_of(j)) {
+            let range = first..first + same.len();
+            first = range.end;
+            parts.push((range, around(same, boxes)));
         }
-        self.refit(boxes, normals);
+        if !parts.is_empty() {
+            self.split_parts(&mut parts, boxes);
+        }
+        self.refit(boxes, normal_of);
     }
 
-    fn fill(&mut self, boxes: &[Box32], normals: &[DVec3]) {
+    fn fill(&mut self, boxes: &[Box32], normal_of: impl Fn(u32) -> DVec3) {
         self.leaves.clear();
         let leaves = self.order.iter().map(|&number| Leaf {
             bounds: boxes[number as usize],
-            normal: normals
-                .get(number as usize)
-                .map_or(Vec3::ZERO, |normal| normal.as_vec3()),
+            normal: normal_of(number).as_vec3(),
             number,
         });
         self.leaves.extend(leaves);
     }
 
+    /// Appends the nodes over parts, each the places of its triangles and the box around them.
+    fn split_parts(&mut self, parts: &mut [(Range<usize>, Box32)], boxes: &[Box32]) {
+        if let [(range, _)] = parts {
+            self.split(range.start, range.end, boxes);
+            return;
+        }
+        let all = parts.iter().map(|(_, bounds)| *bounds);
+        let bounds = all.fold(Box32::EMPTY, Box32::union);
+        let node = self.nodes.len();
+        self.nodes.push(Node {
+            bounds,
+            normals: Box32::EMPTY,
+            next: 0,
+            first: 0,
+            count: 0,
+        });
+        let axis = bounds.longest_axis();
+        let half = parts.len() / 2;
+        parts.select_nth_unstable_by(half, |(one, i), (other, j)| {
+            let (i, j) = (i.center(axis), j.center(axis));
+            i.total_cmp(&j).then(one.start.cmp(&other.start))
+        });
+        let (left, right) = parts.split_at_mut(half);
+        self.split_parts(left, boxes);
+        self.split_parts(right, boxes);
+        self.nodes[node].next = index(self.nodes.len());
+    }
+
     fn split(&mut self, first: usize, end: usize, boxes: &[Box32]) {
         let items = &mut self.order[first..end];
         let of = |number: u32| boxes[number as usize];
-        let bounds = items
-            .iter()
-            .fold(Box32::EMPTY, |all, &number| all.union(of(number)));
+        let bounds = around(items, boxes);
         let is_leaf = items.len() <= LEAF;
         let node = self.nodes.len();
         self.nodes.push(Node {
@@ -167,8 +215,7 @@ impl TriangleTree {
             count: if is_leaf { index(items.len()) } else { 0 },
         });
         if !is_leaf {
-            let size = [0, 1, 2].map(|k| f64::from(bounds.high[k]) - f64::from(bounds.low[k]));
-            let axis = DVec3::from_array(size).max_position();
+            let axis = bounds.longest_axis();
             let half = items.len() / 2;
             items.select_nth_unstable_by(half, |&i, &j| {
                 let centers = (of(i).center(axis), of(j).center(axis));
@@ -181,8 +228,8 @@ impl TriangleTree {
     }
 
     /// Takes over the present boxes and normals, the boxes of removed triangles empty.
-    pub(crate) fn refit(&mut self, boxes: &[Box32], normals: &[DVec3]) {
-        self.fill(boxes, normals);
+    pub(crate) fn refit(&mut self, boxes: &[Box32], normal_of: impl Fn(u32) -> DVec3) {
+        self.fill(boxes, normal_of);
         for i in (0..self.nodes.len()).rev() {
             let node = self.nodes[i];
             let around = if node.count > 0 {
@@ -204,6 +251,13 @@ impl TriangleTree {
             };
             [self.nodes[i].bounds, self.nodes[i].normals] = around;
         }
+    }
+
+    /// Forgets all triangles.
+    pub(crate) fn clear(&mut self) {
+        self.nodes.clear();
+        self.leaves.clear();
+        self.order.clear();
     }
 
     /// How many triangles it was built over.
@@ -269,9 +323,17 @@ mod tests {
     #[test]
     fn finds_what_overlaps() {
         let mut tree = TriangleTree::default();
-        for count in [0_usize, 1, 4, 5, 9, 200] {
+        for (count, parts) in [
+            (0_usize, 1),
+            (1, 1),
+            (4, 1),
+            (5, 2),
+            (9, 3),
+            (200, 1),
+            (200, 7),
+        ] {
             let mut now = boxes(count, 0, 4.0);
-            tree.build(0..index(count), &now, &[]);
+            tree.build(0..index(count), &now, |_| DVec3::ZERO, |i| i % parts);
             for round in 0..3 {
                 for wanted in boxes(50, 1234, 8.0) {
                     let expected: Vec<u32> = (0..index(count))
@@ -283,7 +345,7 @@ mod tests {
                 for empty in now.iter_mut().step_by(3) {
                     *empty = Box32::EMPTY;
                 }
-                tree.refit(&now, &[]);
+                tree.refit(&now, |_| DVec3::ZERO);
             }
         }
     }
@@ -299,7 +361,7 @@ mod tests {
             })
             .collect();
         let mut tree = TriangleTree::default();
-        tree.build(0..index(count), &now, &normals);
+        tree.build(0..index(count), &now, |i| normals[i as usize], |_| 0);
         let mut left_out = 0;
         for wanted in boxes(50, 99, 8.0) {
             let mut found = Vec::new();
