@@ -146,7 +146,7 @@ impl<R: Float> Triangle<R> {
         }
     }
 
-    /// The same for the rows of a color; `take` gets the unknowns as well, to set those of the row.
+    /// Calls `take` with the unknowns `z`, each row of a color and its product with them, to set those of the row.
     pub(super) fn relax(
         &mut self,
         color: usize,
