@@ -6,11 +6,9 @@
 //!
 //! Cost of a cycle: the blocks left of the diagonal twice, those right of it twice; the product, once more the left.
 
-use rayon::prelude::*;
-
 use super::PARALLEL_ROWS;
 use super::block::{Block, apply, solve};
-use super::matrix::Blocks;
+use super::matrix::{Blocks, each_row};
 use super::triangle::Triangle;
 use crate::Float;
 use crate::float::finite;
@@ -52,8 +50,10 @@ impl<R: Float> Smoother<R> {
     /// stay zero.
     pub(super) fn prepare(&mut self, matrix: &Blocks<R>, colors: &[usize], held: &[bool]) {
         if self.pattern != matrix.patterns {
-            self.lower.sync(matrix, colors, |row| matrix.lower(row));
-            self.upper.sync(matrix, colors, |row| matrix.upper(row));
+            rayon::join(
+                || self.lower.sync(matrix, colors, |row| matrix.lower(row)),
+                || self.upper.sync(matrix, colors, |row| matrix.upper(row)),
+            );
             self.pattern = matrix.patterns;
         }
         self.lower.fill::<false>(matrix);
@@ -62,11 +62,18 @@ impl<R: Float> Smoother<R> {
         self.diagonals.clear();
         self.diagonals
             .extend(matrix.offsets[..held.len()].iter().map(diagonal));
-        (0..held.len())
-            .into_par_iter()
-            .with_min_len(PARALLEL_ROWS)
-            .map(|row| inverse::<R>(&self.diagonals[row], held[row]))
-            .collect_into_vec(&mut self.inverses);
+        self.inverses.resize(held.len(), Block::<R>::default());
+        let Self {
+            diagonals,
+            inverses,
+            ..
+        } = self;
+        each_row(
+            inverses,
+            PARALLEL_ROWS,
+            #[inline(always)]
+            |row| inverse::<R>(&diagonals[row], held[row]),
+        );
         self.residual.resize(held.len(), R::Vector::default());
         self.products.resize(held.len(), R::Vector::default());
     }
@@ -126,6 +133,7 @@ impl<R: Float> Smoother<R> {
 }
 /// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal,
 /// so that it is as positive as the block was before rounding; zero if it has none or the row is held.
+#[inline(always)]
 fn inverse<R: Float>(block: &Block<R>, held: bool) -> Block<R> {
     let columns = block.map(R::to_dvec3);
     let trace = columns[0].x + columns[1].y + columns[2].z;

@@ -120,21 +120,30 @@ impl<R: Float> Triangle<R> {
 
     /// Takes the values of the blocks, which `TRANSPOSED` says how their sources hold. O(blocks).
     pub(super) fn fill<const TRANSPOSED: bool>(&mut self, matrix: &Blocks<R>) {
-        let own = self.blocks.par_iter_mut().zip(&self.sources);
-        let own = own.with_min_len(PARALLEL_BLOCKS);
-        own.for_each(|(target, sources)| {
-            let lanes = sources.map(|source| match matrix.blocks.get(source as usize) {
-                Some(block) => block.map(R::components),
-                None => [[R::ZERO; 3]; 3],
-            });
-            for column in 0..3 {
-                for row in 0..3 {
-                    target[3 * column + row] = lanes.map(|block| match TRANSPOSED {
-                        false => block[column][row],
-                        true => block[row][column],
-                    });
-                }
-            }
+        let blocks = self.blocks.par_chunks_mut(PARALLEL_BLOCKS);
+        let own = blocks.zip(self.sources.par_chunks(PARALLEL_BLOCKS));
+        own.for_each(|(targets, sources)| {
+            wide(
+                #[inline(always)]
+                || {
+                    for (target, sources) in targets.iter_mut().zip(sources) {
+                        for (lane, &source) in sources.iter().enumerate() {
+                            let block = matrix.blocks.get(source as usize);
+                            let [a, b, c] = block.copied().unwrap_or_default();
+                            let columns = [R::components(a), R::components(b), R::components(c)];
+                            for (column, entries) in columns.iter().enumerate() {
+                                for (row, &entry) in entries.iter().enumerate() {
+                                    let k = match TRANSPOSED {
+                                        false => 3 * column + row,
+                                        true => 3 * row + column,
+                                    };
+                                    target[k][lane] = entry;
+                                }
+                            }
+                        }
+                    }
+                },
+            );
         });
     }
 
@@ -156,7 +165,7 @@ impl<R: Float> Triangle<R> {
         let slices = self.colors[color]..self.colors[color + 1];
         self.multiply(slices.clone(), z);
         for (rows, products) in self.rows[slices].iter().zip(&self.products) {
-            each_lane::<R>(rows, products, |row, product| take(z, row, product));
+            each_lane::<R>(rows, products, &mut |row, product| take(z, row, product));
         }
     }
 
@@ -199,7 +208,7 @@ impl<R: Float> Triangle<R> {
 fn each_lane<R: Float>(
     rows: &[u32; WIDTH],
     [x, y, z]: &Lanes<R>,
-    mut take: impl FnMut(usize, R::Vector),
+    take: &mut impl FnMut(usize, R::Vector),
 ) {
     for (lane, &row) in rows.iter().enumerate() {
         if row != NONE {
