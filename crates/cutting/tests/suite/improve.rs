@@ -297,6 +297,72 @@ fn strokes_across_each_other() {
     }
 }
 
+/// A cut across an open one crosses both of its sides at one place at rest, where positions in single precision put them
+/// apart by rounding, so that both can be merged together.
+#[test]
+fn both_sides_are_crossed_at_one_place() {
+    let mesh = jittered_box(5, 0.1, 5);
+    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 6.0 * 2.0_f64.sqrt()).cbrt();
+    for (snap, is_swept) in [(0.0, false), (0.1, false), (0.0, true), (0.1, true)] {
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        patient.plane(
+            DVec3::splat(0.43),
+            DVec3::new(1.0, 0.2, 0.1),
+            &options(snap),
+        );
+        let shake = |patient: &mut Patient, seed: u64| {
+            let rest = patient.body.mesh().positions.iter().enumerate();
+            let by = |i: usize| DVec3::from_array([0, 1, 2].map(|k| noise(seed, 3 * i + k)));
+            patient.positions = rest.map(|(i, x)| x + 1e-6 * edge * by(i)).collect();
+        };
+        shake(&mut patient, 7);
+        if is_swept {
+            let pose = |t: f64| {
+                [
+                    DVec3::new(-0.5, 0.47, t),
+                    DVec3::new(1.5, 0.52 + 0.1 * t, t),
+                ]
+            };
+            let mut stroke = Sweep::new(
+                &patient.body,
+                &patient.positions,
+                &pose(-0.1),
+                options(snap),
+            )
+            .unwrap();
+            for i in 0_u32..5 {
+                let before = patient.body.mesh().clone();
+                let positions = patient.positions.clone();
+                let to = pose(0.1 + 0.25 * f64::from(i));
+                let delta = stroke.advance(&mut patient.body, &positions, &to).unwrap();
+                patient.apply(&before, &delta);
+                shake(&mut patient, 10 + u64::from(i));
+            }
+        } else {
+            patient.plane(
+                DVec3::splat(0.47),
+                DVec3::new(0.1, 1.0, 0.2),
+                &options(snap),
+            );
+        }
+        assert_eq!(patient.pieces.count(), 4);
+        let corners = patient.body.boundary().filter(|t| t.tag != FaceTag::Outer);
+        let mut particles: Vec<ParticleId> = corners.flat_map(|t| t.particles).collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let rest = |p: ParticleId| patient.body.mesh().positions[p.index()];
+        for (i, &one) in particles.iter().enumerate() {
+            for &other in &particles[i + 1..] {
+                let distance = rest(one).distance(rest(other)) / edge;
+                assert!(
+                    !(1e-12..1e-4).contains(&distance),
+                    "snap {snap}, swept {is_swept}: {one:?} and {other:?} are {distance} edges apart"
+                );
+            }
+        }
+    }
+}
+
 /// A call stops at its limit and leaves the rest: many small calls bring as much as a large one.
 #[test]
 fn limited_calls_continue() {
