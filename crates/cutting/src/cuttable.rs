@@ -7,6 +7,7 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::faces::{Behind, Face, Faces};
 use crate::places::Places;
+use crate::sheets::Sheets;
 use crate::stars::VertexStars;
 use crate::{BoundaryTriangle, CutError};
 
@@ -22,8 +23,8 @@ pub struct CuttableMesh {
     pub(crate) faces: Faces,
     /// How far planes and level sets were bent to particles. Never iterated.
     pub(crate) bent: HashMap<ParticleId, f64, FixedState>,
-    /// How far improvement has moved cut faces around particles, in m. Never iterated.
-    pub(crate) drift: HashMap<ParticleId, f64, FixedState>,
+    /// The cut faces as they were opened.
+    pub(crate) sheets: Sheets,
     /// Which particles are at one place.
     pub(crate) places: Places,
     /// The mean volume of the tets that the mesh was made of, in m³.
@@ -49,7 +50,7 @@ impl CuttableMesh {
             stars,
             faces,
             bent: HashMap::default(),
-            drift: HashMap::default(),
+            sheets: Sheets::new(edge_of(mean_volume)),
             places: Places::new(edge_of(mean_volume)),
         })
     }
@@ -88,8 +89,8 @@ impl CuttableMesh {
         self.faces.append(&other.faces);
         let bent = other.bent.iter().map(|(&p, &by)| (shifted(p), by));
         self.bent.extend(bent);
-        let drift = other.drift.iter().map(|(&p, &by)| (shifted(p), by));
-        self.drift.extend(drift);
+        self.sheets
+            .append(&other.sheets, &self.mesh.positions, first);
         self.places
             .append(&other.places, &other.mesh.positions, first);
         let original = other.original.iter().map(|range| range.map(|p| first + p));

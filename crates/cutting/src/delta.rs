@@ -143,9 +143,8 @@ pub struct CutDelta {
     pub collapsed: usize,
     /// Snapped particles of a plane or level set that no earlier cut had snapped to, kept for undo.
     pub bent: Vec<ParticleId>,
-    /// Particles around which an improvement moved cut faces, each with the distance in m by which earlier ones had moved
-    /// them; kept for undo.
-    pub drift: Vec<(ParticleId, f64)>,
+    /// Number of faces that were opened, both sides counted as one; kept for undo.
+    pub opened: usize,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
     pub worst_volume_ratio: f64,
     /// The smallest and the largest dihedral angle of a child at rest in degrees, if any tet was cut.

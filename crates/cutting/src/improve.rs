@@ -7,11 +7,12 @@
 //!   no pieces are joined or lost;
 //! - no tet is inverted or nearly so, neither at rest nor in the present shape;
 //! - the smallest sine of a dihedral angle around grows, or stays above [`GOOD`];
-//! - the boundary keeps its shape. Outer faces stay in their planes to rounding. A cut face moves at most by
-//!   [`ImproveOptions::tolerance`] over all calls, and only together with the face opposite to it on the other side of
-//!   the cut, so that one side gains what the other loses and the volume stays to rounding. Where cuts cross, the
-//!   particles of all parts that meet at a place are therefore merged at once. A cut face whose other side is different
-//!   stays in its plane. Rims and corners of cut faces move along a rim only, the front of an unfinished cut not at all.
+//! - the boundary keeps its shape. Outer faces stay in their planes to rounding. A cut face stays within
+//!   [`ImproveOptions::tolerance`] of the faces that its own stroke opened, however often it is moved (module `sheets`). It
+//!   moves only together with the face opposite to it on the other side of the cut, so that one side gains what the other
+//!   loses and the volume stays to rounding. Where cuts cross, the particles of all parts that meet at a place are
+//!   therefore merged at once. A cut face whose other side is different stays in its plane. Rims and corners of cut faces
+//!   move along a rim only, the front of an unfinished cut not at all.
 //!
 //! Original particles are never taken out, so the mesh does not become coarser than it was made. Cost: each round looks
 //! at the particles around the changes of the round before, each with the tets around it and its neighbors; a call ends
@@ -36,6 +37,8 @@ const GOOD: f64 = 0.2;
 const EXACT: f64 = 1e-10;
 /// Smallest cosine between the normals of a face before and after.
 const SMOOTH: f64 = 0.5;
+/// Largest distance of a particle from the plane of a cut face that is to have it as a corner, in tolerances.
+const MOST_BEND: f64 = 2.0;
 /// Smallest cosine between the normals of neighboring faces of a cut; where they fold more, the cut ends.
 const FRONT: f64 = 0.0;
 /// Particles of which the shortest are taken out first.
@@ -46,13 +49,13 @@ const PRESENT: f64 = 0.3;
 /// Limits of [`improve`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImproveOptions {
-    /// Largest distance by which all calls together move a cut face, as a fraction of the edge of a regular tet with the
-    /// mean volume of the original ones; from 0 to 0.25.
+    /// Largest distance of a cut face from the faces that its stroke opened, as a fraction of the edge of a regular tet with
+    /// the mean volume of the original ones; from 0 to 0.25.
     pub tolerance: f64,
     /// Whether all boundary triangles keep their particles, so that only particles inside are taken out.
     pub keeps_boundary: bool,
-    /// Number of tets to look at after which a call ends; one counts each time its shape is computed. A call looks at one
-    /// particle at least.
+    /// Number of tets to look at after which a call ends; one counts each time its shape is computed, and a cut face each
+    /// time it is compared. A call looks at one particle at least.
     pub max_tets: usize,
 }
 
@@ -130,7 +133,6 @@ pub fn improve(
         positions,
         first: BTreeMap::new(),
         deleted: BTreeSet::new(),
-        drift_before: BTreeMap::new(),
         looked_at: Cell::new(0),
         collapsed: 0,
     };
@@ -153,6 +155,8 @@ struct FanFace {
     tag: FaceTag,
     /// Whether the other side of the cut has this face too.
     is_mirrored: bool,
+    /// Whether what holds for the face on the other side holds for this one.
+    is_represented: bool,
 }
 
 /// What is around a particle.
@@ -186,6 +190,7 @@ impl Star {
                 next,
                 tag,
                 is_mirrored: false,
+                is_represented: false,
             })
         });
         let fan = fan.collect();
@@ -258,8 +263,6 @@ struct Improvement<'a> {
     keeps_boundary: bool,
     first: BTreeMap<TetId, Original>,
     deleted: BTreeSet<TetId>,
-    /// How far cut faces had been moved before, around those particles where that changes.
-    drift_before: BTreeMap<ParticleId, f64>,
     /// Tets looked at, each time counted.
     looked_at: Cell<usize>,
     collapsed: usize,
@@ -279,8 +282,6 @@ struct Shape {
 struct Collapse {
     from: ParticleId,
     to: ParticleId,
-    /// How far cut faces have moved then, in all.
-    distance: f64,
 }
 
 impl Improvement<'_> {
@@ -368,7 +369,7 @@ impl Improvement<'_> {
         }
         // Most particles that must stay are at rims and corners, which is known before their other sides are.
         let mut targets = star.targets();
-        targets.retain(|to| self.may_bend(&star, *to, true).is_some());
+        targets.retain(|to| self.may_bend(&star, *to, true));
         if targets.is_empty() {
             return Vec::new();
         }
@@ -395,7 +396,11 @@ impl Improvement<'_> {
                             let of_part = self.quality(part, *shape, collapse.to, least);
                             quality = quality.min(of_part.unwrap_or(f64::NEG_INFINITY));
                             of_part.is_some()
-                        });
+                        })
+                        && parts
+                            .iter()
+                            .zip(&collapses)
+                            .all(|(part, collapse)| self.keeps_cuts(part, collapse.to));
                 if is_better {
                     best = Some((quality, collapses));
                 }
@@ -475,6 +480,7 @@ impl Improvement<'_> {
             {
                 parts[i].fan[k].is_mirrored = true;
                 parts[j].fan[l].is_mirrored = true;
+                parts[j].fan[l].is_represented = parts[i].fan[k].tag == parts[j].fan[l].tag;
                 let (keep, drop) = (groups[i].min(groups[j]), groups[i].max(groups[j]));
                 groups
                     .iter_mut()
@@ -520,11 +526,11 @@ impl Improvement<'_> {
         }
         let mut collapses: Vec<Collapse> = Vec::with_capacity(parts.len());
         for (part, to) in parts.iter().zip(targets) {
-            collapses.push(Collapse {
-                from: part.particle,
-                to,
-                distance: self.may_bend(part, to, false)?,
-            });
+            if !self.may_bend(part, to, false) {
+                return None;
+            }
+            let from = part.particle;
+            collapses.push(Collapse { from, to });
         }
         // One must not change what is around another one.
         for (i, part) in parts.iter().enumerate() {
@@ -538,33 +544,64 @@ impl Improvement<'_> {
         Some(collapses)
     }
 
-    /// How far cut faces have been moved in all if a particle is merged into another one. `None` if faces move that must
-    /// not, too far, or turn too far. `is_mirrored` takes all cut faces for mirrored.
-    fn may_bend(&self, star: &Star, to: ParticleId, is_mirrored: bool) -> Option<f64> {
+    /// Whether the faces around a particle may move and turn as they do if it is merged into another one. `is_mirrored`
+    /// takes all cut faces for mirrored.
+    fn may_bend(&self, star: &Star, to: ParticleId, is_mirrored: bool) -> bool {
         let (at, target) = (self.rest(star.particle), self.rest(to));
-        let drift = |p: &ParticleId| self.cuttable.drift.get(p).copied().unwrap_or(0.0);
-        let (mut bend, mut before): (f64, f64) = (0.0, 0.0);
-        for face in &star.fan {
-            if face.tag != FaceTag::Outer {
-                let corners = face.next.iter().chain([&star.particle]);
-                before = corners.map(drift).fold(before, f64::max);
-            }
+        star.fan.iter().all(|face| {
             if face.next.contains(&to) {
-                continue;
+                return true;
             }
-            let across = self.normal(at, face).try_normalize()?;
-            let height = (target - at).dot(across).abs();
+            let [Some(before), Some(after)] =
+                [at, target].map(|from| self.normal(from, face).try_normalize())
+            else {
+                return false;
+            };
+            let height = (target - at).dot(before).abs();
             let may_move = face.is_mirrored || (is_mirrored && face.tag != FaceTag::Outer);
-            if height > self.exact && !may_move {
-                return None;
-            }
-            if across.dot(self.normal(target, face).try_normalize()?) < SMOOTH {
-                return None;
-            }
-            bend = bend.max(height);
+            let most = if may_move {
+                MOST_BEND * self.tolerance
+            } else {
+                0.0
+            };
+            height <= most.max(self.exact) && before.dot(after) >= SMOOTH
+        })
+    }
+
+    /// Whether the cut faces around a particle stay within the tolerance of what their strokes opened if it is merged into
+    /// another one.
+    fn keeps_cuts(&self, star: &Star, to: ParticleId) -> bool {
+        if self.keeps_regions(star, to) {
+            return true;
         }
-        let distance = bend + before;
-        (bend <= self.exact || distance <= self.tolerance).then_some(distance)
+        let CuttableMesh { mesh, sheets, .. } = &*self.cuttable;
+        star.fan.iter().all(|face| {
+            let FaceTag::Cut(stroke) = face.tag else {
+                return true;
+            };
+            if face.next.contains(&to) || face.is_represented {
+                return true;
+            }
+            self.looked_at.set(self.looked_at.get() + 1);
+            let corners = [to, face.next[0], face.next[1]].map(|p| self.rest(p));
+            sheets.has_near(mesh, stroke, corners, self.tolerance)
+        })
+    }
+
+    /// Whether the faces of each kind around a particle cover what they covered, to rounding, if it is merged into another
+    /// one: all stay in their planes, and the rim between two kinds is straight there.
+    fn keeps_regions(&self, star: &Star, to: ParticleId) -> bool {
+        let (at, target) = (self.rest(star.particle), self.rest(to));
+        let is_level = |face: &FanFace| {
+            let normal = self.normal(at, face).normalize_or_zero();
+            (target - at).dot(normal).abs() <= self.exact
+        };
+        let along = (target - at).normalize_or_zero();
+        let is_in_line = |end: &ParticleId| {
+            let offset = self.rest(*end) - at;
+            (offset - along * along.dot(offset)).length() <= self.exact
+        };
+        star.fan.iter().all(is_level) && star.rims().iter().all(is_in_line)
     }
 
     /// The shape of the tets around a particle.
@@ -714,7 +751,7 @@ impl Improvement<'_> {
 
     /// Merges a particle into another one.
     fn collapse(&mut self, collapse: Collapse) {
-        let Collapse { from, to, distance } = collapse;
+        let Collapse { from, to } = collapse;
         for tet in Star::of(self.cuttable, from).tets {
             self.note(tet, true);
             let corners = self.cuttable.mesh.tets[tet.index()];
@@ -758,11 +795,6 @@ impl Improvement<'_> {
                 }
             }
         }
-        if distance > self.exact {
-            let drift = self.cuttable.drift.entry(to).or_insert(0.0);
-            self.drift_before.entry(to).or_insert(*drift);
-            *drift = drift.max(distance);
-        }
         self.collapsed += 1;
     }
 
@@ -772,7 +804,6 @@ impl Improvement<'_> {
             cuttable,
             first,
             deleted,
-            drift_before,
             collapsed,
             ..
         } = self;
@@ -781,7 +812,6 @@ impl Improvement<'_> {
             particles_before: mesh.positions.len(),
             tets_before: mesh.tets.len(),
             collapsed,
-            drift: drift_before.into_iter().collect(),
             worst_volume_ratio: 1.0,
             ..CutDelta::default()
         };
@@ -838,6 +868,7 @@ fn stay_alone(parts: &mut Vec<Star>) {
     parts.truncate(1);
     for face in parts.iter_mut().flat_map(|part| &mut part.fan) {
         face.is_mirrored = false;
+        face.is_represented = false;
     }
 }
 

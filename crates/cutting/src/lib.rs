@@ -51,6 +51,7 @@ mod plane;
 mod quality;
 mod remove;
 mod separate;
+mod sheets;
 mod side_labels;
 mod sign_split;
 mod skin;

@@ -64,7 +64,8 @@ struct Original {
 pub(crate) struct Operation<'a> {
     pub(crate) cuttable: &'a mut CuttableMesh,
     pub(crate) delta: CutDelta,
-    tag: FaceTag,
+    /// Number of the cut, with which faces that it opens are tagged.
+    number: u32,
     max_tets: usize,
     /// Parts of a smaller volume do not come off, in m³.
     pub(crate) crumb_limit: f64,
@@ -86,7 +87,7 @@ impl<'a> Operation<'a> {
             cuttable,
             delta,
             crumb_limit,
-            tag: FaceTag::Cut(options.tag),
+            number: options.tag,
             max_tets: options.max_tets,
             first: BTreeMap::new(),
             ancestors: Vec::new(),
@@ -157,15 +158,11 @@ impl<'a> Operation<'a> {
             return Err(SplitError::TooThin(thin));
         }
 
-        for (point, &x) in points.iter().zip(&at_rest) {
+        for &x in &at_rest {
             let particle = ParticleId::new(mesh.positions.len());
             mesh.positions.push(x);
             self.cuttable.stars.push_particle();
             self.cuttable.places.enter(particle, x);
-            let drift = point.ends.map(|end| self.cuttable.drift.get(&end));
-            if let Some(&most) = drift.into_iter().flatten().max_by(|a, b| a.total_cmp(b)) {
-                self.cuttable.drift.insert(particle, most);
-            }
         }
         self.delta.points.extend(points);
         let mut touched = Vec::with_capacity(children.len());
@@ -237,15 +234,29 @@ impl<'a> Operation<'a> {
             // Their tags are noted as they were.
             self.note(face.tet(), false);
             self.note(twin.tet(), false);
-            self.cuttable.faces.open(face, self.tag);
-            self.cuttable.faces.open(twin, self.tag);
+            self.open(face);
+            let tag = FaceTag::Cut(self.number);
+            self.cuttable.faces.open(twin, tag);
         }
+    }
+
+    /// Makes a face a boundary triangle, which stands for both sides.
+    fn open(&mut self, face: Face) {
+        let CuttableMesh {
+            mesh,
+            faces,
+            sheets,
+            ..
+        } = &mut *self.cuttable;
+        faces.open(face, FaceTag::Cut(self.number));
+        sheets.enter(face.particles(mesh), self.number, &mesh.positions);
+        self.delta.opened += 1;
     }
 
     /// Makes a face whose neighbor is taken away a boundary triangle of this cut.
     pub(crate) fn expose(&mut self, face: Face) {
         self.note(face.tet(), false);
-        self.cuttable.faces.open(face, self.tag);
+        self.open(face);
     }
 
     pub(crate) fn push_copy(&mut self, source: ParticleId) -> ParticleId {
@@ -256,9 +267,6 @@ impl<'a> Operation<'a> {
         self.cuttable.stars.push_particle();
         self.cuttable.places.enter(source, x);
         self.cuttable.places.enter(copy, x);
-        if let Some(&drift) = self.cuttable.drift.get(&source) {
-            self.cuttable.drift.insert(copy, drift);
-        }
         if let Some(&distance) = self.cuttable.bent.get(&source) {
             self.cuttable.bent.insert(copy, distance);
         }

@@ -47,6 +47,7 @@ pub(crate) fn cut_by_signs(
     let particles = values.len();
     let mut operation = Operation::begin(cuttable, options);
     let mut flagged = crossings;
+    operation.cuttable.align_sides(flagged.iter_mut());
     loop {
         flagged.retain(|c| c.ends.iter().all(|p| !on_surface[p.index()]));
         match operation.split(&flagged) {

@@ -200,6 +200,8 @@ impl Stroke {
         for hit in &mut hits {
             hit.crossing.parameter = hit.crossing.parameter.clamp(reach, 1.0 - reach);
         }
+        let crossings = hits.iter_mut().map(|hit| &mut hit.crossing);
+        operation.cuttable.align_sides(crossings);
         let near = loop {
             let crossings: Vec<Crossing> = hits.iter().map(|hit| hit.crossing).collect();
             match operation.split(&crossings) {

@@ -60,25 +60,16 @@ impl CutDelta {
             stars,
             faces,
             bent,
-            drift,
+            sheets,
             places,
             mean_volume: _,
             original: _,
         } = cuttable;
         let new = (self.particles_before..self.particles_after()).map(ParticleId::new);
-        for particle in new.clone().chain(self.bent.iter().copied()) {
+        for particle in new.chain(self.bent.iter().copied()) {
             bent.remove(&particle);
         }
-        for particle in new {
-            drift.remove(&particle);
-        }
-        for &(particle, before) in &self.drift {
-            if before > 0.0 {
-                drift.insert(particle, before);
-            } else {
-                drift.remove(&particle);
-            }
-        }
+        sheets.truncate(mesh, sheets.count() - self.opened);
         places.truncate(mesh, self.particles_before);
         let face = |tet: TetId, opposite: u8| Face::of(tet)[usize::from(opposite)];
         for triangle in &self.surface_added {

@@ -189,11 +189,7 @@ impl MergedMesh {
             crumb_volume: delta.crumb_volume,
             collapsed: delta.collapsed,
             bent: delta.bent.iter().map(|&p| particle(p)).collect(),
-            drift: delta
-                .drift
-                .iter()
-                .map(|&(p, by)| (particle(p), by))
-                .collect(),
+            opened: delta.opened,
             worst_volume_ratio: delta.worst_volume_ratio,
             dihedral: delta.dihedral,
         };

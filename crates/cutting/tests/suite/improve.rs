@@ -3,7 +3,7 @@
 use glam::DVec3;
 use incise_cutting::{
     CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, ImproveOptions, PieceTracker, Plane,
-    Skin, Sweep, cut_plane, cut_surface, improve, remove_tets,
+    Skin, StrokeRegistry, Sweep, cut_plane, cut_surface, improve, remove_tets,
 };
 use incise_mesh::{ParticleId, TetId, TetMesh, closest_on_triangle, kuhn_box};
 use proptest::prelude::*;
@@ -17,6 +17,8 @@ struct Patient {
     pieces: PieceTracker,
     skin: Skin,
     near: Vec<ParticleId>,
+    /// The cut faces of each stroke before they were improved.
+    opened: Vec<Vec<[DVec3; 3]>>,
 }
 
 impl Patient {
@@ -28,6 +30,7 @@ impl Patient {
             skin: Skin::new(body.boundary()),
             body,
             near: Vec::new(),
+            opened: Vec::new(),
         }
     }
 
@@ -274,6 +277,9 @@ fn short_strokes(
                 .unwrap();
             patient.apply(&before, &delta);
         }
+        patient
+            .opened
+            .push(faces_of(&patient.body, i.try_into().unwrap()));
         if let Some(options) = options {
             patient.improve(options, |_| false);
         }
@@ -294,6 +300,72 @@ fn strokes_across_each_other() {
         });
         assert!(2 * improved.0 < plain.0, "{plain:?} {improved:?}");
         assert!(2 * improved.1 < plain.1, "{plain:?} {improved:?}");
+    }
+}
+
+/// A cut across an open one crosses both of its sides at one place at rest, where positions in single precision put them
+/// apart by rounding, so that both can be merged together.
+#[test]
+fn both_sides_are_crossed_at_one_place() {
+    let mesh = jittered_box(5, 0.1, 5);
+    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 6.0 * 2.0_f64.sqrt()).cbrt();
+    for (snap, is_swept) in [(0.0, false), (0.1, false), (0.0, true), (0.1, true)] {
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        patient.plane(
+            DVec3::splat(0.43),
+            DVec3::new(1.0, 0.2, 0.1),
+            &options(snap),
+        );
+        let shake = |patient: &mut Patient, seed: u64| {
+            let rest = patient.body.mesh().positions.iter().enumerate();
+            let by = |i: usize| DVec3::from_array([0, 1, 2].map(|k| noise(seed, 3 * i + k)));
+            patient.positions = rest.map(|(i, x)| x + 1e-6 * edge * by(i)).collect();
+        };
+        shake(&mut patient, 7);
+        if is_swept {
+            let pose = |t: f64| {
+                [
+                    DVec3::new(-0.5, 0.47, t),
+                    DVec3::new(1.5, 0.52 + 0.1 * t, t),
+                ]
+            };
+            let mut stroke = Sweep::new(
+                &patient.body,
+                &patient.positions,
+                &pose(-0.1),
+                options(snap),
+            )
+            .unwrap();
+            for i in 0_u32..5 {
+                let before = patient.body.mesh().clone();
+                let positions = patient.positions.clone();
+                let to = pose(0.1 + 0.25 * f64::from(i));
+                let delta = stroke.advance(&mut patient.body, &positions, &to).unwrap();
+                patient.apply(&before, &delta);
+                shake(&mut patient, 10 + u64::from(i));
+            }
+        } else {
+            patient.plane(
+                DVec3::splat(0.47),
+                DVec3::new(0.1, 1.0, 0.2),
+                &options(snap),
+            );
+        }
+        assert_eq!(patient.pieces.count(), 4);
+        let corners = patient.body.boundary().filter(|t| t.tag != FaceTag::Outer);
+        let mut particles: Vec<ParticleId> = corners.flat_map(|t| t.particles).collect();
+        particles.sort_unstable();
+        particles.dedup();
+        let rest = |p: ParticleId| patient.body.mesh().positions[p.index()];
+        for (i, &one) in particles.iter().enumerate() {
+            for &other in &particles[i + 1..] {
+                let distance = rest(one).distance(rest(other)) / edge;
+                assert!(
+                    !(1e-12..1e-4).contains(&distance),
+                    "snap {snap}, swept {is_swept}: {one:?} and {other:?} are {distance} edges apart"
+                );
+            }
+        }
     }
 }
 
@@ -386,6 +458,84 @@ fn cut_faces_do_not_drift() {
         );
     }
     assert!(moved > 1e-4 * edge);
+}
+
+/// However often cut faces are merged, and however closely another stroke runs beside or continues, all of a face stays
+/// within the tolerance of what the stroke opened whose number it has.
+#[test]
+fn cut_faces_stay_with_their_stroke() {
+    let mesh = jittered_box(5, 0.1, 5);
+    let improves = ImproveOptions::default();
+    let crossing = |snap: f64| short_strokes(&mesh, 16, snap, Some(&improves));
+    // Through one line, nearly in each other.
+    let turned = |snap: f64| {
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        for i in 0..8 {
+            let turn = 0.03 * f64::from(i);
+            let normal = DVec3::new(1.0, turn, 0.1 - turn);
+            let options = CutOptions {
+                tag: i,
+                ..options(snap)
+            };
+            patient.plane(DVec3::splat(0.47), normal, &options);
+            patient.opened.push(faces_of(&patient.body, i));
+            patient.improve(&improves, |_| false);
+        }
+        patient
+    };
+    // Many at one place, which join each other where they are nearly one surface.
+    let dense = |snap: f64| {
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        let mut registry = StrokeRegistry::default();
+        for i in 0..16 {
+            let direction =
+                |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(1, 20 * i + 3 * k + j)));
+            let center = DVec3::splat(0.5) + 0.1 * direction(0);
+            let along = 0.5 * direction(1).normalize_or(DVec3::X);
+            let path = 0.5 * direction(2).normalize_or(DVec3::Y);
+            let pose = |t: f64| [center - along + path * t, center + along + path * t];
+            let tag = u32::try_from(i).unwrap();
+            let options = CutOptions {
+                tag,
+                ..options(snap)
+            };
+            let mut stroke =
+                Sweep::new(&patient.body, &patient.positions, &pose(-1.0), options).unwrap();
+            for t in [-0.5, 0.0, 0.5, 1.0] {
+                let before = patient.body.mesh().clone();
+                let positions = patient.positions.clone();
+                let delta = stroke
+                    .advance_joining(&mut patient.body, &positions, &pose(t), &mut registry)
+                    .unwrap();
+                patient.apply(&before, &delta);
+            }
+            patient.opened.push(faces_of(&patient.body, tag));
+            let delta = patient.improve(&improves, |_| false);
+            registry.apply_delta(&patient.body, &delta, &options);
+        }
+        patient
+    };
+    for snap in [0.0, 0.1] {
+        for patient in [crossing(snap), turned(snap), dense(snap)] {
+            let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 6.0 * 2.0_f64.sqrt()).cbrt();
+            let most = improves.tolerance * edge * (1.0 + 1e-9);
+            for (stroke, opened) in (0..).zip(&patient.opened) {
+                for [a, b, c] in faces_of(&patient.body, stroke) {
+                    let weights = (0..=4).flat_map(|i| (0..=4 - i).map(move |j| [i, j]));
+                    for [u, v] in weights.map(|w| w.map(|i| f64::from(i) / 4.0)) {
+                        let x = a + (b - a) * u + (c - a) * v;
+                        let is_near = |face: &[DVec3; 3]| {
+                            closest_on_triangle(*face, x).point.distance(x) <= most
+                        };
+                        assert!(
+                            opened.iter().any(is_near),
+                            "snap {snap}: {x} is far from the faces of stroke {stroke}"
+                        );
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// The corners of the cut faces of a stroke.
