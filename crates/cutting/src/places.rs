@@ -1,8 +1,9 @@
 //! [`Places`]: which particles are at one place at rest, such as those on both sides of a cut.
 //!
 //! Copies are at the place of their particle, and a cut that crosses an open cut makes points on both sides of it at one
-//! place, but for rounding ([`CuttableMesh::align_sides`]). Particles are chained by the cell of a fine grid that they are in. Two that rounding puts into
-//! neighboring cells are not found, which costs an improvement and nothing else. Cost: a look-up for each new particle.
+//! place, but for rounding ([`CuttableMesh::align_sides`]). Particles are chained by the cell of a fine grid that they are
+//! in. Two that rounding puts into neighboring cells are not found, which costs an improvement and nothing else. Cost: a
+//! look-up for each new particle.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -127,7 +128,6 @@ impl CuttableMesh {
     /// The two sides of an open cut are crossed one by one, at present positions that differ by rounding. Crossings change
     /// only where an edge lies along an open cut. Cost: for those a pass over the tets around the ends on all sides.
     pub(crate) fn align_sides<'a>(&self, crossings: impl Iterator<Item = &'a mut Crossing>) {
-        if std::env::var("OFF").is_ok() { return; }
         let close = ONE_CROSSING * self.mean_edge();
         // By the places of the ends, each with the crossings there.
         let mut known: BTreeMap<[ParticleId; 2], Vec<DVec3>> = BTreeMap::new();
@@ -160,7 +160,6 @@ impl CuttableMesh {
             };
             let aligned = before.or_else(made);
             if let Some(y) = aligned.filter(|y| !self.places.is_same(*y, x)) {
-                eprintln!("ALIGN {:e}", y.distance(x) / self.mean_edge());
                 crossing.parameter = along(ends, y);
             }
             if before.is_none() {
