@@ -79,7 +79,7 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x22fd_0a33_5779_e50a),
+        (Precision::F32, 0xd7c4_3c78_8d2d_43c8),
         (Precision::F64, 0xbaba_0eca_5e0f_0f18),
     ] {
         scene.solver.precision = precision;
