@@ -26,6 +26,7 @@
 //!
 //! The crate does not depend on constraints, solvers, colors or the GPU.
 
+mod align;
 mod bisect;
 mod blade;
 mod broad_phase;

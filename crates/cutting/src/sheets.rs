@@ -247,7 +247,7 @@ mod tests {
         let (sheets, mesh) = sheets();
         let square = |height: f64, size: f64| [0.0, 1.0, 2.0].map(|k| corner(k, height, size));
         let is_near = |stroke, triangle| sheets.has_near(&mesh, stroke, triangle, 0.1);
-        // Over both triangles of a stroke, as far as the distance.
+        // Over both triangles of a stroke, up to the distance.
         assert!(is_near(3, square(0.0, 1.0)) && is_near(3, square(0.09, 1.0)));
         assert!(!is_near(3, square(0.11, 1.0)) && !is_near(3, square(0.0, 1.2)));
         assert!(is_near(8, square(1.0, 20.0)) && is_near(8, square(1.05, 0.01)));

@@ -1,0 +1,69 @@
+//! [`CuttableMesh::align_sides`]: crosses both sides of an open cut at one place at rest.
+//!
+//! Each side is crossed by itself, at present positions that differ by rounding. Particles at one place can be merged
+//! together later. Cost: a look-up for each crossing, and a pass over the tets around those on an open cut.
+
+use std::collections::BTreeMap;
+
+use glam::DVec3;
+use incise_mesh::ParticleId;
+
+use crate::CuttableMesh;
+use crate::operation::Crossing;
+
+/// How far apart the crossings of the two sides of an open cut may be to count as one, in edges of a mean tet. Positions in
+/// single precision put them apart by some 1e-6; the sides of a cut that gapes are crossed at really different places.
+const ONE_CROSSING: f64 = 1e-4;
+
+impl CuttableMesh {
+    /// Moves crossings of edges at one place to one place, each to the first next to its own of those before it in the list
+    /// and of the particles that earlier calls made.
+    ///
+    /// The two sides of an open cut are crossed one by one, at present positions that differ by rounding. Crossings change
+    /// only where an edge lies along an open cut. Cost: for those a pass over the tets around the ends on all sides.
+    pub(crate) fn align_sides<'a>(&self, crossings: impl Iterator<Item = &'a mut Crossing>) {
+        let close = ONE_CROSSING * self.mean_edge();
+        // By the places of the ends, each with the crossings there.
+        let mut known: BTreeMap<[ParticleId; 2], Vec<DVec3>> = BTreeMap::new();
+        for crossing in crossings {
+            let ends = crossing.ends.map(|p| self.mesh.positions[p.index()]);
+            let sides = ends.map(|x| self.places.at(&self.mesh, x).collect::<Vec<_>>());
+            if sides.iter().all(|side| side.len() < 2) {
+                continue;
+            }
+            let [a, b] = [0, 1].map(|k| {
+                let particles = sides[k].iter().copied();
+                particles.fold(crossing.ends[k], ParticleId::min)
+            });
+            let known = known.entry([a.min(b), a.max(b)]).or_default();
+            let x = ends[0].lerp(ends[1], crossing.parameter);
+            let is_close = |y: &DVec3| x.distance_squared(*y) <= close * close;
+            let before = known.iter().copied().find(is_close);
+            let made = || {
+                let particles = sides.iter().flatten().chain(&crossing.ends);
+                let around = particles.flat_map(|&p| self.around(p));
+                let corners = around.flat_map(|tet| self.mesh.tets[tet.index()]);
+                let made = corners.filter(|p| !self.is_original(*p));
+                let is_on_edge = |y: &DVec3| {
+                    let parameter = along(ends, *y);
+                    (0.0..=1.0).contains(&parameter)
+                        && self.places.is_same(ends[0].lerp(ends[1], parameter), *y)
+                };
+                let at = |p: ParticleId| self.mesh.positions[p.index()];
+                made.map(at).find(|y| is_close(y) && is_on_edge(y))
+            };
+            let aligned = before.or_else(made);
+            if let Some(y) = aligned.filter(|y| !self.places.is_same(*y, x)) {
+                crossing.parameter = along(ends, y);
+            }
+            if before.is_none() {
+                known.push(aligned.unwrap_or(x));
+            }
+        }
+    }
+}
+
+/// The parameter of a position on an edge: 0 at the first end, 1 at the second.
+fn along([a, b]: [DVec3; 2], x: DVec3) -> f64 {
+    (x - a).dot(b - a) / (b - a).length_squared()
+}
