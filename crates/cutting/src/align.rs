@@ -16,21 +16,22 @@ use crate::operation::Crossing;
 const ONE_CROSSING: f64 = 1e-4;
 
 impl CuttableMesh {
-    /// Moves crossings of edges at one place to one place, each to the first next to its own of those before it in the list
-    /// and of the particles that earlier calls made.
+    /// Gives crossings of coincident edges the same rest position: that of the first one within [`ONE_CROSSING`], or of a
+    /// particle that an earlier call created there.
     ///
-    /// The two sides of an open cut are crossed one by one, at present positions that differ by rounding. Crossings change
-    /// only where an edge lies along an open cut. Cost: for those a pass over the tets around the ends on all sides.
+    /// Edges coincide only along an open cut; all other crossings stay. Cost: two look-ups for each crossing, and for those
+    /// along an open cut a pass over the tets around the ends on all sides.
     pub(crate) fn align_sides<'a>(&self, crossings: impl Iterator<Item = &'a mut Crossing>) {
         let close = ONE_CROSSING * self.mean_edge();
         // By the places of the ends, each with the crossings there.
         let mut known: BTreeMap<[ParticleId; 2], Vec<DVec3>> = BTreeMap::new();
         for crossing in crossings {
             let ends = crossing.ends.map(|p| self.mesh.positions[p.index()]);
-            let sides = ends.map(|x| self.places.at(&self.mesh, x).collect::<Vec<_>>());
-            if sides.iter().all(|side| side.len() < 2) {
+            let has_copy = |x: &DVec3| self.places.at(&self.mesh, *x).nth(1).is_some();
+            if !ends.iter().any(has_copy) {
                 continue;
             }
+            let sides = ends.map(|x| self.places.at(&self.mesh, x).collect::<Vec<_>>());
             let [a, b] = [0, 1].map(|k| {
                 let particles = sides[k].iter().copied();
                 particles.fold(crossing.ends[k], ParticleId::min)

@@ -37,7 +37,8 @@ const GOOD: f64 = 0.2;
 const EXACT: f64 = 1e-10;
 /// Smallest cosine between the normals of a face before and after.
 const SMOOTH: f64 = 0.5;
-/// Largest distance of a particle from the plane of a cut face that is to have it as a corner, in tolerances.
+/// Largest distance of a particle from the plane of a cut face that is to have it as a corner, in tolerances: from one limit
+/// on one side of the stroke's faces to that on the other. A quick test before that of the whole face.
 const MOST_BEND: f64 = 2.0;
 /// Smallest cosine between the normals of neighboring faces of a cut; where they fold more, the cut ends.
 const FRONT: f64 = 0.0;
@@ -155,7 +156,7 @@ struct FanFace {
     tag: FaceTag,
     /// Whether the other side of the cut has this face too.
     is_mirrored: bool,
-    /// Whether what holds for the face on the other side holds for this one.
+    /// Whether the coincident face on the other side has the same tag, so that a test of that one is enough.
     is_represented: bool,
 }
 

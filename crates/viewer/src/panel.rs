@@ -13,7 +13,7 @@ use crate::session::Session;
 use crate::settings::{self, SettingChange};
 use crate::tool::Tool;
 
-/// State of the window that the panel shows and changes, beside the session.
+/// State of the window that the panel shows and changes, beside the scene.
 #[derive(Debug)]
 pub(crate) struct Controls<'a> {
     pub(crate) running: bool,
@@ -43,7 +43,7 @@ pub(crate) struct UiCommands {
     pub(crate) measure: Option<bool>,
 }
 
-/// Shows the panel; without a session only the field to open a file.
+/// Shows the panel; without a scene only the field to open a file.
 pub(crate) fn show(
     ui: &mut Ui,
     session: Option<&mut Session>,

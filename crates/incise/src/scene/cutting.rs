@@ -13,8 +13,9 @@ pub struct CuttingSpec {
     #[schemars(range(min = 0.0, max = 100.0))]
     pub crumbs: f64,
     /// Whether particles that cuts created are taken out again where the mesh is better or as good without them, so that
-    /// cuts of cuts do not make ever smaller tets: in frames without a blade on its way, some in each. Cut faces move by at
-    /// most a twentieth of an edge; in a scene with contact they stay, and only particles inside are taken out.
+    /// cuts of cuts do not make ever smaller tets: in frames without a blade on its way, some in each. Cut faces stay
+    /// within a twentieth of an edge of where they were cut; in a scene with contact they do not move, and only particles
+    /// inside are taken out.
     pub improve: bool,
 }
 

@@ -1,6 +1,6 @@
 //! [`Session`]: a simulation that is shown and edited in the window.
 //!
-//! A session owns all data of a loaded scene. The window has the camera, the tools and a [`View`] to draw and to pick in;
+//! It owns all data of a loaded scene. The window has the camera, the tools and a [`View`] to draw and to pick in;
 //! the [`Engine`] with the simulation is away on a thread while it works. Commands that are given meanwhile wait, in order,
 //! and are executed before the next step. Input comes in pixels and is converted to world space here.
 

@@ -1,4 +1,4 @@
-//! A session without a window: lines are drawn, bodies cut, pulled and restored, also while the simulation is away.
+//! Editing without a window: lines are drawn, bodies cut, pulled and restored, also while the simulation is away.
 
 use std::sync::mpsc::{Sender, channel};
 

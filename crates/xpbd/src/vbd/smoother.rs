@@ -131,6 +131,7 @@ impl<R: Float> Smoother<R> {
         });
     }
 }
+
 /// The inverse of a symmetric block, in double precision and with the last digits of its trace added to the diagonal,
 /// so that it is as positive as the block was before rounding; zero if it has none or the row is held.
 #[inline(always)]
