@@ -55,6 +55,12 @@ impl CuttableMesh {
         })
     }
 
+    /// Turns on or off that cuts record the faces they open, some 100 bytes each; on at first. Only [`improve`](crate::improve())
+    /// needs them: a cut face that was not recorded stays in its plane. O(1).
+    pub fn record_opened_faces(&mut self, on: bool) {
+        self.sheets.is_recording = on;
+    }
+
     /// Appends another mesh with its cuts. Its particles and tets follow those of this mesh, in their order, and so do
     /// its boundary triangles, which keep their tags. Sweeps that are under way on either mesh end. O(mesh appended).
     ///

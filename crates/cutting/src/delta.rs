@@ -143,7 +143,7 @@ pub struct CutDelta {
     pub collapsed: usize,
     /// Snapped particles of a plane or level set that no earlier cut had snapped to, kept for undo.
     pub bent: Vec<ParticleId>,
-    /// Number of faces that were opened, both sides counted as one; kept for undo.
+    /// Number of opened faces that were recorded, both sides counted as one; kept for undo.
     pub opened: usize,
     /// The smallest volume of a child as a fraction of its parent's (1 if none was cut).
     pub worst_volume_ratio: f64,

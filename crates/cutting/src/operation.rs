@@ -249,8 +249,10 @@ impl<'a> Operation<'a> {
             ..
         } = &mut *self.cuttable;
         faces.open(face, FaceTag::Cut(self.number));
-        sheets.enter(face.particles(mesh), self.number, &mesh.positions);
-        self.delta.opened += 1;
+        if sheets.is_recording {
+            sheets.enter(face.particles(mesh), self.number, &mesh.positions);
+            self.delta.opened += 1;
+        }
     }
 
     /// Makes a face whose neighbor is taken away a boundary triangle of this cut.

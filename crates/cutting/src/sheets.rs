@@ -23,6 +23,8 @@ const MOST_SIZES: usize = 1024;
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Sheets {
+    /// Whether faces that open are entered.
+    pub(crate) is_recording: bool,
     /// Size of the smallest cells in m.
     cell: f64,
     /// Particles and number of the stroke, in the order in which the faces were opened.
@@ -39,6 +41,7 @@ impl Sheets {
     /// Those of a mesh whose mean tet has edges of a length in m.
     pub(crate) fn new(edge: f64) -> Self {
         Self {
+            is_recording: true,
             cell: edge,
             ..Self::default()
         }

@@ -167,10 +167,12 @@ impl Island {
         mut joined: IslandBuilder,
     ) -> Result<Self, Error> {
         let mesh = std::mem::take(&mut joined.mesh);
-        let cuttable = CuttableMesh::new(mesh).map_err(|source| Error::Cut {
+        let mut cuttable = CuttableMesh::new(mesh).map_err(|source| Error::Cut {
             field: "body".into(),
             source,
         })?;
+        // In a scene with contact improvement leaves the boundary alone.
+        cuttable.record_opened_faces(scene.cutting.improve && scene.contact.is_none());
         let mut solver = joined.solver(precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
