@@ -421,6 +421,7 @@ impl<R: Real> SolverBackend for Backend<R> {
         let (solver, asks) = (&self.solver, |quantity| quantities.contains(&quantity));
         Ok(Measures {
             energy: asks(Quantity::Energy).then(|| solver.energy(gravity)),
+            sliver_energy: asks(Quantity::Energy).then(|| solver.sliver_energy()),
             volume: asks(Quantity::Volume).then(|| solver.volume()),
             max_speed: asks(Quantity::Speed).then(|| solver.max_speed()),
         })

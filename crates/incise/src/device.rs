@@ -84,6 +84,7 @@ impl SolverBackend for Device {
         let measures = self.solver.measure(gravity)?;
         Ok(Measures {
             energy: Some(measures.energy),
+            sliver_energy: None,
             volume: Some(measures.volume),
             max_speed: Some(measures.max_speed),
         })

@@ -43,7 +43,11 @@ pub(crate) fn states(
     if !quantities.iter().any(is_of_state) {
         return Ok(Vec::new());
     }
-    let state = |island: &mut Island| island.solver.backend_mut().state(gravity, quantities);
+    let state = |island: &mut Island| {
+        let measures = island.solver.backend_mut().state(gravity, quantities)?;
+        island.judge_energy(&measures);
+        Ok(measures)
+    };
     islands.iter_mut().map(state).collect()
 }
 

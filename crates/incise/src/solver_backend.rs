@@ -21,6 +21,8 @@ pub(crate) enum LastSubstep {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Measures {
     pub(crate) energy: Option<Energy>,
+    /// The elastic energy of slivers; unknown on a device.
+    pub(crate) sliver_energy: Option<f64>,
     pub(crate) volume: Option<Volume>,
     pub(crate) max_speed: Option<f64>,
 }

@@ -36,6 +36,8 @@ pub enum WarningCode {
     VibrationsDamped,
     /// Cuts have left more than 1% of a body's volume in tets that are solved less accurately than asked for.
     OutsideAccuracy,
+    /// Slivers hold more than a tenth of the elastic energy that is reported.
+    SliverEnergy,
     /// A region of the scene contains no particle, or no tet.
     EmptyRegion,
     /// A body starts inside the ground or a collider.

@@ -14,6 +14,7 @@ use crate::backend::each;
 use crate::island_builder::{demands, substeps};
 use crate::method::tet_solve;
 use crate::scene::{Method, Substeps};
+use crate::solver_backend::Measures;
 use crate::substeps::{Choice, Shortfall, evaluate};
 use crate::warning::{self, Warning, WarningCode};
 
@@ -38,6 +39,9 @@ pub(crate) struct Judged {
     pub(crate) outside: OutsideVolume,
     /// Whether the last frame of VBD missed the accuracy wanted.
     pub(crate) misses_accuracy: bool,
+    /// Whether it was reported that slivers hold much of the elastic energy.
+    #[cfg_attr(feature = "save", serde(default))]
+    pub(crate) sliver_energy_reported: bool,
     /// Warnings for the next report.
     pub(crate) warnings: Vec<Warning>,
     /// Change of kappa by the last cut, if it is reported.
@@ -56,6 +60,7 @@ impl Judged {
             size: longest_side(&mesh.positions),
             outside: OutsideVolume::default(),
             misses_accuracy: false,
+            sliver_energy_reported: false,
             warnings: Vec::new(),
             cut_kappa: None,
         }
@@ -109,6 +114,13 @@ const MOST_GROWTH: u32 = 2;
 
 /// Factor by which gravity may be weaker than on earth and still decide the precision.
 const WEAKEST: f64 = 1e4;
+
+/// The part of the elastic energy that slivers may hold without a warning.
+const SLIVER_ENERGY: f64 = 0.1;
+
+/// Energy below which nothing is judged, as a part of stiffness times volume: a strain of 3e-5, which is near rounding in a
+/// sliver.
+const NO_ENERGY: f64 = 1e-9;
 
 /// Material, kappa and volume of a tet.
 pub(super) fn accuracy_data<R: Real>(
@@ -352,6 +364,29 @@ impl Island {
             self.warn(WarningCode::NotConverged, message);
         }
         self.judged.misses_accuracy = misses;
+    }
+
+    /// Warns, once, when slivers hold much of a reported elastic energy.
+    pub(crate) fn judge_energy(&mut self, measures: &Measures) {
+        let (Some(energy), Some(of_slivers)) = (measures.energy, measures.sliver_energy) else {
+            return;
+        };
+        let stiffness = each!(&self.solver, solver => {
+            let moduli = solver.materials().iter().map(|m| m.young_modulus);
+            moduli.fold(0.0, f64::max)
+        });
+        let least = NO_ENERGY * stiffness * self.cuttable.mesh().total_volume();
+        let is_much = of_slivers > least.max(SLIVER_ENERGY * energy.elastic);
+        if self.judged.sliver_energy_reported || !is_much {
+            return;
+        }
+        self.judged.sliver_energy_reported = true;
+        let message = format!(
+            "{:.0}% of the elastic energy is that of tets below a hundredth of the mean volume, which a tiny error of \
+             position raises by orders of magnitude; use more snap in strokes, or more substeps",
+            100.0 * of_slivers / energy.elastic
+        );
+        self.warn(WarningCode::SliverEnergy, message);
     }
 
     /// Makes [`Island::apply_delta`] note the largest kappa of the tets that the cuts of a frame create, and if wanted

@@ -1,9 +1,9 @@
 //! Bodies after random cuts, with the default settings: at rest they stay at rest, under load they stay bounded.
 
-use incise::Simulation;
 use incise::mesh_io;
 use incise::meshing::{Shape, irregular};
 use incise::scene::{Precision, Scene};
+use incise::{Simulation, WarningCode};
 
 /// Random numbers from 0 to below 1 (`SplitMix64`).
 struct Random(u64);
@@ -206,4 +206,30 @@ fn random_rectangles(count: usize, seed: u64) -> String {
         );
     }
     text
+}
+
+/// Under load, after cuts without snapping, slivers hold much of the elastic energy: a warning says so, once, and only where
+/// energy is reported. A body that is not cut has none.
+#[test]
+fn energy_of_slivers_is_told() {
+    let warnings = |strokes: usize, quantity: &str| -> usize {
+        let text = format!(
+            "[world]\ngravity = [0.0, 0.0, -9.81]\n[report]\nquantities = [\"{quantity}\"]\n\
+             [[body]]\nshape = {{ kind = \"liver\", tets = 1500 }}\nscale = 0.25\nyoung_modulus = 1e4\n\
+             fixed = [{{ half_space = {{ point = [-0.08, 0.0, 0.0], normal = [-1.0, 0.0, 0.0] }} }}]\n{}",
+            random_sweeps(strokes, 0.0, 3)
+        );
+        let mut simulation = Simulation::new(&Scene::from_toml(&text).unwrap()).unwrap();
+        let frames = (0..40).map(|_| {
+            let warnings = simulation.step().unwrap().warnings();
+            let told = warnings
+                .iter()
+                .filter(|w| w.code == WarningCode::SliverEnergy);
+            told.count()
+        });
+        frames.sum()
+    };
+    assert_eq!(warnings(12, "energy"), 1);
+    assert_eq!(warnings(12, "volume"), 0);
+    assert_eq!(warnings(0, "energy"), 0);
 }

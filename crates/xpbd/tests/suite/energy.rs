@@ -1,7 +1,7 @@
 //! Energies and forces: rest, rotation, small strains, and that the solver's force is the slope of the energy.
 
 use glam::{DMat3, DQuat, DVec3, dvec3};
-use incise_mesh::{TetMesh, kuhn_box};
+use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
 use incise_xpbd::{Material, Real, Solver};
 
 use crate::body::{Noise, RUBBER, body, disturb, plain, schedule, substep, within};
@@ -211,4 +211,43 @@ fn energies_of_motion_and_height_are_the_textbook_ones() {
         (elastic(&solver) - before).abs(),
         1e-6,
     );
+}
+
+/// Beside the six tets of a cube a flat one: the difference between the energies with and without it.
+#[test]
+fn slivers_hold_what_the_other_tets_do_not() {
+    let mut mesh = kuhn_box([1, 1, 1], DVec3::ONE);
+    let [a, b, c, _] = mesh.tets[0];
+    let [x, y, z] = [a, b, c].map(|p| mesh.positions[p.index()]);
+    let normal = (y - x).cross(z - x).normalize();
+    let apex = ParticleId::new(mesh.positions.len());
+    let without = elastic(&stretched(&mesh));
+    mesh.positions.push((x + y + z) / 3.0 + normal * 1e-3);
+    mesh.tets.push([a, b, c, apex]);
+    if mesh.volume(TetId::new(mesh.tets.len() - 1)) < 0.0 {
+        mesh.tets.last_mut().unwrap().swap(0, 1);
+    }
+    let with = stretched(&mesh);
+    let slivers = with.sliver_energy();
+    assert!(slivers > 1e-4 * without);
+    within(
+        "energy of the sliver",
+        ((elastic(&with) - slivers) / without - 1.0).abs(),
+        1e-12,
+    );
+    assert_eq!(
+        stretched(&kuhn_box([1, 1, 1], DVec3::ONE)).sliver_energy(),
+        0.0
+    );
+}
+
+/// A body stretched to twice its length.
+fn stretched(mesh: &TetMesh) -> Solver<f64> {
+    let mut solver = body::<f64>(mesh, RUBBER);
+    deform(
+        &mut solver,
+        mesh,
+        DMat3::from_diagonal(dvec3(2.0, 1.0, 1.0)),
+    );
+    solver
 }
