@@ -217,3 +217,115 @@ fn an_edge_has_its_nearest_contacts() {
     let of_long = |contact: &&EdgeContact| contact.particles[..2] == nearest.particles[..2];
     assert_eq!(edges.iter().filter(of_long).count(), 4, "{edges:?}");
 }
+
+/// One vertex that moves is searched for, and those near its triangles, and no others.
+#[test]
+fn a_vertex_is_searched_for_alone() {
+    let mut scene = two_boxes(0.01, ContactSettings::default());
+    let edge = scene.contacts.mean_edge();
+    assert!(scene.update().searched);
+    assert!(!scene.update().searched);
+    let inner = |x: DVec3| x.x > 0.3 && x.x < 0.9 && x.y > 0.3 && x.y < 0.9;
+    let moved = (0..scene.positions.len())
+        .find(|&p| (scene.positions[p].z - 1.01).abs() < 1e-9 && inner(scene.positions[p]))
+        .unwrap();
+    scene.positions[moved].z += 0.12 * edge;
+    let update = scene.update();
+    assert!(update.searched);
+    let few = scene.contacts.searched_vertices();
+    assert!((2..20).contains(&few), "{few}");
+    // What it has moved by is known.
+    assert!(!scene.update().searched);
+    compare(&scene);
+}
+
+/// What shakes and comes back uses up no more of the skin than its farthest way, however long it goes on: vertices beside
+/// their body, and a body as a whole.
+#[test]
+fn what_shakes_in_place_is_not_searched_for_again() {
+    for turns in [false, true] {
+        let mut scene = two_boxes(0.01, ContactSettings::default());
+        let skin = scene.contacts.settings().skin * scene.contacts.mean_edge();
+        let rest = scene.positions.clone();
+        let above = scene.particles_of(1);
+        assert!(scene.update().searched);
+        let mut length = 0.0;
+        for frame in 0..200 {
+            let before = scene.positions.clone();
+            for (i, rest) in rest.iter().enumerate() {
+                let swing = (1.1 * f64::from(frame) + 6.0 * noise(1, i)).sin();
+                scene.positions[i] = *rest + direction(1, i) * (0.04 * skin * swing);
+            }
+            for &i in above.iter().filter(|_| turns) {
+                let swing = 0.02 * skin * (0.9 * f64::from(frame)).sin();
+                let about = scene.positions[i] - DVec3::new(0.6, 0.6, 1.5);
+                scene.positions[i] += swing * (DVec3::X + DVec3::Y.cross(about));
+            }
+            length += scene.positions[above[0]].distance(before[above[0]]);
+            assert!(
+                !scene.update().searched,
+                "in frame {frame}, turning {turns}"
+            );
+        }
+        assert!(length > 2.0 * skin, "{length}");
+    }
+}
+
+/// Where vertices are searched for one by one, nothing is missed that may touch within the frame: bodies that shake all
+/// over, a few vertices of them fast.
+#[test]
+fn nothing_is_missed_where_vertices_are_searched_for_alone() {
+    let (mut some, mut compared) = (0, 0);
+    for seed in 0..4 {
+        let mut scene = two_boxes(0.004, ContactSettings::default());
+        let count = scene.particles_of(0).len();
+        let all = scene.contacts.surface().vertices().count();
+        let rest = scene.positions.clone();
+        for frame in 0..60 {
+            let time = f64::from(frame) * FRAME;
+            for (i, rest) in rest.iter().enumerate() {
+                let is_fast = noise(seed, 500 + i) > 0.9;
+                let most = if is_fast { 0.03 } else { 0.004 };
+                let speed = 12.0 + 6.0 * noise(seed, i);
+                let way = direction(seed, i) * most;
+                scene.positions[i] = *rest + way * (speed * time).sin();
+                scene.velocities[i] = way * (speed * (speed * time).cos());
+                // The second body slides and rocks.
+                if i >= count {
+                    let slow = DVec3::new(0.02, 0.01, -0.002);
+                    let about = DVec3::new(-0.7, 1.0, 0.2).cross(*rest - DVec3::splat(1.5)) * 0.01;
+                    scene.positions[i] += slow * time + about * (9.0 * time).sin();
+                    scene.velocities[i] += slow + about * (9.0 * (9.0 * time).cos());
+                }
+            }
+            scene.update();
+            let searched = scene.contacts.searched_vertices();
+            some += u32::from(searched > 0 && searched < all);
+            let mut fresh = scene.contacts.clone();
+            fresh.search_again();
+            fresh.update(&incise_contact::ContactState {
+                mesh: &scene.body,
+                pieces: &scene.pieces,
+                positions: &scene.positions,
+                velocities: &scene.velocities,
+                fixed: &scene.fixed,
+                frame_time: FRAME,
+            });
+            let skin = fresh.settings().skin * fresh.mean_edge();
+            for contact in fresh.faces() {
+                let [vertex, corners @ ..] = &contact.particles;
+                let margin = scene.reach(&[*vertex], corners) - skin;
+                if contact.gap(&scene.positions) > margin {
+                    continue;
+                }
+                compared += 1;
+                let is_known = scene.contacts.faces().iter().any(|known| {
+                    known.particles[0] == *vertex
+                        && (known.particles[1] as usize >= count) == (corners[0] as usize >= count)
+                });
+                assert!(is_known, "seed {seed}, frame {frame}: {contact:?}");
+            }
+        }
+    }
+    assert!(some > 100 && compared > 300, "{some} and {compared}");
+}
