@@ -1,7 +1,7 @@
 //! [`AnySolver`]: the solver of an island in either precision or on a device, and its update after a cut.
 //!
-//! Functions that depend on the device or the method are in [`SolverBackend`]. Edits and measurements that all solvers
-//! of `incise-xpbd` share are written once, for either precision, with `each!` and `each_mut!`.
+//! Functions that depend on the device or the method are in [`SolverBackend`]. Edits and measurements are those of the
+//! [`ErasedSolver`] behind it, in either precision.
 
 use std::ops::Range;
 
@@ -9,7 +9,7 @@ use glam::{DMat3, DVec3};
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{Forces, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
+use incise_xpbd::{ErasedSolver, Forces, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
 use web_time::Instant;
 
 use crate::Error;
@@ -57,52 +57,6 @@ impl Clone for AnySolver {
     }
 }
 
-/// Evaluates an expression with the solver of any variant. On a device this is the host's solver, whose state is that
-/// of the last readback.
-macro_rules! each {
-    ($any:expr, $solver:ident => $body:expr) => {
-        match $any {
-            $crate::backend::AnySolver::Single($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            $crate::backend::AnySolver::Double($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            #[cfg(feature = "gpu")]
-            $crate::backend::AnySolver::Device(device) => {
-                let $solver = device.solver.cached_host();
-                $body
-            }
-        }
-    };
-}
-pub(crate) use each;
-
-/// Evaluates an expression with the solver of any variant, mutable, in a function that may return an error. The state
-/// of a device is read back first.
-macro_rules! each_mut {
-    ($any:expr, $solver:ident => $body:expr) => {
-        match $any {
-            $crate::backend::AnySolver::Single($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            $crate::backend::AnySolver::Double($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            #[cfg(feature = "gpu")]
-            $crate::backend::AnySolver::Device(device) => {
-                let $solver = device.solver.edit()?;
-                $body
-            }
-        }
-    };
-}
-pub(crate) use each_mut;
-
 impl AnySolver {
     pub(crate) fn backend(&self) -> &dyn SolverBackend {
         match self {
@@ -120,6 +74,16 @@ impl AnySolver {
             #[cfg(feature = "gpu")]
             Self::Device(device) => &mut **device,
         }
+    }
+
+    /// The solver on the CPU, to be read: [`SolverBackend::host`].
+    pub(crate) fn host(&self) -> &dyn ErasedSolver {
+        self.backend().host()
+    }
+
+    /// The solver on the CPU, to be edited: [`SolverBackend::edit`].
+    pub(crate) fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
+        self.backend_mut().edit()
     }
 
     /// A solver with particles, and nothing else yet.
@@ -162,54 +126,54 @@ impl AnySolver {
         cuttable: &CuttableMesh,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
-        each_mut!(self, solver => {
-            for point in &delta.points {
-                let [a, b] = point.ends.map(ParticleId::index);
-                solver.push_particle_between(a, b, point.parameter);
-            }
-            for source in &delta.copies {
-                solver.push_copy(source.index());
-            }
-            let mut added: Vec<_> = delta.added.iter().collect();
-            added.sort_unstable_by_key(|tet| tet.tet);
-            for tet in added {
-                let corners = tet.corners.map(|p| p.0);
-                let rest = tet.corners.map(|p| mesh.positions[p.index()]);
-                if tet.tet.index() < solver.tet_count() {
-                    solver.replace_tet(tet.tet.index(), corners, rest);
-                } else {
-                    solver.push_tet(corners, rest, solver.material_of(tet.parent.index()));
-                }
-            }
-            for tet in &delta.relinked {
-                solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
-            }
-            for tet in &delta.moved {
-                solver.move_tet(tet.from.index(), tet.to.index());
-            }
-            solver.truncate_tets(delta.tets_after());
-            let mut star = Vec::new();
-            let touched = touched(delta);
-            let regions = if delta.collapsed > 0 {
-                regions(delta, &touched)
+        let solver = self.edit()?;
+        for point in &delta.points {
+            let [a, b] = point.ends.map(ParticleId::index);
+            solver.push_particle_between(a, b, point.parameter);
+        }
+        for source in &delta.copies {
+            solver.push_copy(source.index());
+        }
+        let mut added: Vec<_> = delta.added.iter().collect();
+        added.sort_unstable_by_key(|tet| tet.tet);
+        for tet in added {
+            let corners = tet.corners.map(|p| p.0);
+            let rest = tet.corners.map(|p| mesh.positions[p.index()]);
+            if tet.tet.index() < solver.tet_count() {
+                solver.replace_tet(tet.tet.index(), corners, rest);
             } else {
-                Vec::new()
-            };
-            let momenta: Vec<Momentum> = regions.iter().map(|region| Momentum::of(solver, region)).collect();
-            for &p in &touched {
-                let mass = mass(solver, cuttable, p, &mut star);
-                solver.set_mass_in_star(p.index(), mass, star.iter().map(|tet| tet.index()));
+                solver.push_tet(corners, rest, solver.material_of(tet.parent.index()));
             }
-            for (region, before) in regions.iter().zip(momenta) {
-                before.restore(solver, region);
+        }
+        for tet in &delta.relinked {
+            solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
+        }
+        for tet in &delta.moved {
+            solver.move_tet(tet.from.index(), tet.to.index());
+        }
+        solver.truncate_tets(delta.tets_after());
+        let mut star = Vec::new();
+        let touched = touched(delta);
+        let regions = if delta.collapsed > 0 {
+            regions(delta, &touched)
+        } else {
+            Vec::new()
+        };
+        let momentum = |region: &Vec<ParticleId>| Momentum::of(solver, region);
+        let momenta: Vec<Momentum> = regions.iter().map(momentum).collect();
+        for &p in &touched {
+            let mass = mass(solver, cuttable, p, &mut star);
+            solver.set_mass_in_star(p.index(), mass, &mut star.iter().map(|tet| tet.index()));
+        }
+        for (region, before) in regions.iter().zip(momenta) {
+            before.restore(solver, region);
+        }
+        // Particles that lost all their tets stay where they are.
+        for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
+            if cuttable.around(p).next().is_none() {
+                solver.set_velocity(p.index(), DVec3::ZERO);
             }
-            // Particles that lost all their tets stay where they are.
-            for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
-                if cuttable.around(p).next().is_none() {
-                    solver.set_velocity(p.index(), DVec3::ZERO);
-                }
-            }
-        });
+        }
         Ok(())
     }
 
@@ -258,26 +222,20 @@ impl AnySolver {
         if before == limit {
             return Ok(());
         }
-        each_mut!(self, solver => {
-            solver.limit_kappa(limit);
-            for t in 0..solver.tet_count() {
-                if exceeds(solver, t, before) || exceeds(solver, t, limit) {
-                    solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
-                }
+        let solver = self.edit()?;
+        solver.limit_kappa(limit);
+        for t in 0..solver.tet_count() {
+            if exceeds(solver, t, before) || exceeds(solver, t, limit) {
+                solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
             }
-        });
+        }
         Ok(())
-    }
-
-    /// The residual of each tet in the last substep, if they were kept; VBD has none.
-    pub(crate) fn residuals_of_tets(&self, substep_time: f64) -> Option<Vec<f64>> {
-        each!(self, solver => solver.residuals_of_tets(substep_time))
     }
 
     /// Whether a limit softens a tet. O(tets).
     pub(crate) fn exceeds(&self, limit: Option<KappaLimit>) -> bool {
-        limit.is_some()
-            && each!(self, solver => (0..solver.tet_count()).any(|t| exceeds(solver, t, limit)))
+        let solver = self.host();
+        limit.is_some() && (0..solver.tet_count()).any(|t| exceeds(solver, t, limit))
     }
 
     /// Whether the solver is on a device with the cluster mapping of the settings.
@@ -301,32 +259,30 @@ impl AnySolver {
 
     /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
     pub(crate) fn check(&self, cuttable: &CuttableMesh, schedule: &Schedule) -> Result<(), Error> {
-        let mesh = cuttable.mesh();
-        each!(self, solver => {
-            if (solver.particle_count(), solver.tet_count()) != (mesh.positions.len(), mesh.tets.len()) {
-                return Err(Error::Inconsistent("the solver has another size than the mesh".into()));
-            }
-            for (t, tet) in mesh.tets.iter().enumerate() {
-                if solver.tet_particles(t) != tet.map(|p| p.0) {
-                    return Err(Error::Inconsistent(format!("tet {t} has other particles in the solver")));
-                }
-            }
-            let mut star = Vec::new();
-            for p in 0..mesh.positions.len() {
-                let fresh = mass(solver, cuttable, ParticleId::new(p), &mut star);
-                let stored = solver.mass(p);
-                if (stored - fresh).abs() > 1e-12 * fresh {
-                    return Err(Error::Inconsistent(format!("particle {p} has mass {stored} instead of {fresh}")));
-                }
-            }
-            solver.check_layout(schedule).map_err(|error| Error::Inconsistent(error.to_string()))?;
-        });
-        match self {
-            Self::Single(backend) => backend.check_vbd(),
-            Self::Double(backend) => backend.check_vbd(),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => Ok(device.solver.check(schedule)?),
+        let (mesh, solver) = (cuttable.mesh(), self.host());
+        let sizes = (solver.particle_count(), solver.tet_count());
+        if sizes != (mesh.positions.len(), mesh.tets.len()) {
+            let what = "the solver has another size than the mesh";
+            return Err(Error::Inconsistent(what.into()));
         }
+        for (t, tet) in mesh.tets.iter().enumerate() {
+            if solver.tet_particles(t) != tet.map(|p| p.0) {
+                let what = format!("tet {t} has other particles in the solver");
+                return Err(Error::Inconsistent(what));
+            }
+        }
+        let mut star = Vec::new();
+        for p in 0..mesh.positions.len() {
+            let fresh = mass(solver, cuttable, ParticleId::new(p), &mut star);
+            let stored = solver.mass(p);
+            if (stored - fresh).abs() > 1e-12 * fresh {
+                let what = format!("particle {p} has mass {stored} instead of {fresh}");
+                return Err(Error::Inconsistent(what));
+            }
+        }
+        let layout = solver.check_layout(schedule);
+        layout.map_err(|error| Error::Inconsistent(error.to_string()))?;
+        self.backend().check(schedule)
     }
 
     /// The solver on a device, if it is on one.
@@ -336,15 +292,6 @@ impl AnySolver {
             Self::Device(device) => Some(&device.solver),
             _ => None,
         }
-    }
-
-    /// The position of a particle in the world in m.
-    pub(crate) fn position(&self, particle: u32) -> DVec3 {
-        each!(self, solver => solver.position(particle as usize))
-    }
-
-    pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
-        each!(self, solver => solver.positions(out));
     }
 }
 
@@ -356,13 +303,6 @@ impl<R: Real> Backend<R> {
         }
     }
 
-    fn check_vbd(&self) -> Result<(), Error> {
-        let checked = self.vbd.as_ref().map(|vbd| vbd.check(&self.solver));
-        checked
-            .unwrap_or(Ok(()))
-            .map_err(|error| Error::Inconsistent(error.to_string()))
-    }
-
     fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
         if spec.method == Method::Vbd {
             self.vbd = Some(Vbd::new(&self.solver, spec)?);
@@ -372,6 +312,14 @@ impl<R: Real> Backend<R> {
 }
 
 impl<R: Real> SolverBackend for Backend<R> {
+    fn host(&self) -> &dyn ErasedSolver {
+        &self.solver
+    }
+
+    fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
+        Ok(&mut self.solver)
+    }
+
     fn step(
         &mut self,
         schedule: &Schedule,
@@ -384,10 +332,7 @@ impl<R: Real> SolverBackend for Backend<R> {
             None if keep => solver.step_keeping_residuals(schedule, settings),
             None => solver.step(schedule, settings),
         };
-        step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })
+        step.map_err(Error::xpbd("solver"))
     }
 
     fn step_part(
@@ -398,10 +343,7 @@ impl<R: Real> SolverBackend for Backend<R> {
         keep: bool,
     ) -> Result<StepReport, Error> {
         let step = self.solver.step_part(schedule, settings, part, keep);
-        step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })
+        step.map_err(Error::xpbd("solver"))
     }
 
     fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {
@@ -474,23 +416,22 @@ impl<R: Real> SolverBackend for Backend<R> {
         self.vbd = None;
     }
 
-    fn read_back(&mut self) -> Result<usize, Error> {
-        Ok(0)
-    }
-
-    fn take_repaired(&mut self) -> usize {
-        0
+    fn check(&self, _: &Schedule) -> Result<(), Error> {
+        let checked = self.vbd.as_ref().map(|vbd| vbd.check(&self.solver));
+        checked
+            .unwrap_or(Ok(()))
+            .map_err(|error| Error::Inconsistent(error.to_string()))
     }
 }
 
 /// Whether a tet is too stiff for a limit.
-fn exceeds<R: Real>(solver: &Solver<R>, tet: usize, limit: Option<KappaLimit>) -> bool {
+fn exceeds(solver: &dyn ErasedSolver, tet: usize, limit: Option<KappaLimit>) -> bool {
     limit.is_some_and(|limit| solver.kappa_of(tet, limit.substep_time) > limit.kappa)
 }
 
 /// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.
-pub(crate) fn mass<R: Real>(
-    solver: &Solver<R>,
+pub(crate) fn mass(
+    solver: &dyn ErasedSolver,
     cuttable: &CuttableMesh,
     particle: ParticleId,
     star: &mut Vec<TetId>,
@@ -557,7 +498,7 @@ struct Momentum {
 }
 
 impl Momentum {
-    fn of<R: Real>(solver: &Solver<R>, particles: &[ParticleId]) -> Self {
+    fn of(solver: &dyn ErasedSolver, particles: &[ParticleId]) -> Self {
         let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
         for p in particles.iter().map(|p| p.index()) {
             let momentum = solver.mass(p) * solver.velocity(p);
@@ -569,7 +510,7 @@ impl Momentum {
 
     /// Gives particles that have other masses now this momentum again, with the rigid motion that makes up for the
     /// difference. A region where the solver holds a particle still keeps its velocities.
-    fn restore<R: Real>(self, solver: &mut Solver<R>, particles: &[ParticleId]) {
+    fn restore(self, solver: &mut dyn ErasedSolver, particles: &[ParticleId]) {
         let with_mass = particles.iter().map(|p| p.index());
         let with_mass: Vec<usize> = with_mass.filter(|&p| solver.mass(p) > 0.0).collect();
         if with_mass.iter().any(|&p| !solver.is_free(p)) {
@@ -625,34 +566,33 @@ mod tests {
             let mut cuttable = CuttableMesh::new(mesh.clone()).unwrap();
             let mut any = AnySolver::of_particles(Precision::F64, &mesh.positions);
             let mut star = Vec::new();
-            each_mut!(&mut any, solver => {
-                let material = Material {
-                    young_modulus: 1e5,
-                    poisson_ratio: 0.4,
-                    density: 1100.0,
-                    damping: 0.0,
-                };
-                solver.add_material(material).unwrap();
-                for (t, tet) in mesh.tets.iter().enumerate() {
-                    solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), 0);
-                }
-                for (p, x) in mesh.positions.iter().enumerate() {
-                    let (sin, cos) = (0.4 * x.z).sin_cos();
-                    let twisted = DVec3::new(cos * x.x - sin * x.y, sin * x.x + cos * x.y, x.z);
-                    solver.set_position(p, twisted);
-                    solver.set_velocity(p, DVec3::new(x.y * x.z, 1.0 - x.x, (7.0 * x.x).sin()));
-                    let mass = mass(solver, &cuttable, ParticleId::new(p), &mut star);
-                    solver.set_mass(p, mass);
-                }
-            });
+            let solver = any.edit()?;
+            let material = Material {
+                young_modulus: 1e5,
+                poisson_ratio: 0.4,
+                density: 1100.0,
+                damping: 0.0,
+            };
+            solver.add_material(material).unwrap();
+            for (t, tet) in mesh.tets.iter().enumerate() {
+                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), 0);
+            }
+            for (p, x) in mesh.positions.iter().enumerate() {
+                let (sin, cos) = (0.4 * x.z).sin_cos();
+                let twisted = DVec3::new(cos * x.x - sin * x.y, sin * x.x + cos * x.y, x.z);
+                solver.set_position(p, twisted);
+                solver.set_velocity(p, DVec3::new(x.y * x.z, 1.0 - x.x, (7.0 * x.x).sin()));
+                let mass = mass(solver, &cuttable, ParticleId::new(p), &mut star);
+                solver.set_mass(p, mass);
+            }
             let all = |any: &AnySolver| {
-                each!(any, solver => {
-                    let all: Vec<ParticleId> = (0..solver.particle_count()).map(ParticleId::new).collect();
-                    let mass: f64 = all.iter().map(|p| solver.mass(p.index())).sum();
-                    let mut positions = Vec::new();
-                    solver.positions(&mut positions);
-                    (mass, Momentum::of(solver, &all), positions)
-                })
+                let solver = any.host();
+                let all = (0..solver.particle_count()).map(ParticleId::new);
+                let all: Vec<ParticleId> = all.collect();
+                let mass: f64 = all.iter().map(|p| solver.mass(p.index())).sum();
+                let mut positions = Vec::new();
+                solver.positions(&mut positions);
+                (mass, Momentum::of(solver, &all), positions)
             };
             let mut near = Vec::new();
             for (i, normal) in [DVec3::X, DVec3::new(1.0, 0.3, 0.1)]

@@ -10,7 +10,7 @@ use glam::DVec3;
 use incise_clustering::Method;
 use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
 use incise_graph::Schedule;
-use incise_xpbd::{Forces, Pose, Solver, StepReport, StepSettings};
+use incise_xpbd::{ErasedSolver, Pose, Solver, StepReport, StepSettings};
 use web_time::Instant;
 
 use crate::Error;
@@ -45,6 +45,14 @@ impl Device {
 }
 
 impl SolverBackend for Device {
+    fn host(&self) -> &dyn ErasedSolver {
+        self.solver.cached_host()
+    }
+
+    fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
+        Ok(self.solver.edit()?)
+    }
+
     fn step(
         &mut self,
         schedule: &Schedule,
@@ -95,33 +103,9 @@ impl SolverBackend for Device {
         residuals.map(LastSubstep::Constraints)
     }
 
-    fn measure_forces(&mut self, _measuring: bool) {}
-
-    fn forces(&self) -> Option<Forces> {
-        None
-    }
-
     fn move_handle(&mut self, handle: u32, pose: Pose) {
         self.solver.move_handle(handle, pose);
     }
-
-    fn bytes(&self) -> usize {
-        self.solver.cached_host().bytes()
-    }
-
-    fn host_max_speed(&self) -> Option<f64> {
-        None
-    }
-
-    fn update_vbd(&mut self, _: Option<&[u32]>, _: &mut Milliseconds) -> Result<(), Error> {
-        Ok(())
-    }
-
-    fn vbd_error(&self) -> Option<f64> {
-        None
-    }
-
-    fn end_vbd(&mut self) {}
 
     fn read_back(&mut self) -> Result<usize, Error> {
         self.solver.host()?;
@@ -133,6 +117,10 @@ impl SolverBackend for Device {
         let fresh = repaired.wrapping_sub(self.reported) as usize;
         self.reported = repaired;
         fresh
+    }
+
+    fn check(&self, schedule: &Schedule) -> Result<(), Error> {
+        Ok(self.solver.check(schedule)?)
     }
 }
 

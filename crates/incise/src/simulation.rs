@@ -24,7 +24,6 @@ use rayon::prelude::*;
 use web_time::Instant;
 
 use crate::attachment::Support;
-use crate::backend::each;
 use crate::budget;
 use crate::collider::Colliders;
 use crate::compute_device::{ComputeDevice, OpenDevice};
@@ -580,16 +579,15 @@ impl Simulation {
     pub fn supports(&self) -> Vec<Support> {
         let mut supports = vec![Support::Free; self.mesh().positions.len()];
         for (g, island) in self.state.islands.iter().enumerate() {
-            each!(&island.solver, solver => {
-                for p in 0..solver.particle_count() {
-                    let support = match (solver.is_fixed(p), solver.handle_of(p)) {
-                        (true, _) => Support::Pinned,
-                        (false, Some(_)) => Support::Attached,
-                        (false, None) => continue,
-                    };
-                    supports[self.particle(g, p)] = support;
-                }
-            });
+            let solver = island.solver.host();
+            for p in 0..solver.particle_count() {
+                let support = match (solver.is_fixed(p), solver.handle_of(p)) {
+                    (true, _) => Support::Pinned,
+                    (false, Some(_)) => Support::Attached,
+                    (false, None) => continue,
+                };
+                supports[self.particle(g, p)] = support;
+            }
         }
         supports
     }

@@ -4,7 +4,9 @@ use std::ops::Range;
 
 use glam::DVec3;
 use incise_graph::Schedule;
-use incise_xpbd::{Energy, Forces, Pose, Residuals, StepReport, StepSettings, Volume};
+use incise_xpbd::{
+    Energy, ErasedSolver, Forces, Pose, Residuals, StepReport, StepSettings, Volume,
+};
 
 use crate::Error;
 use crate::report::Milliseconds;
@@ -28,8 +30,14 @@ pub(crate) struct Measures {
 }
 
 /// A solver on the CPU in one precision, by XPBD or VBD, or one on a device. Functions that only one kind needs do
-/// nothing in the others.
+/// nothing by default.
 pub(crate) trait SolverBackend {
+    /// The solver on the CPU, to be read. That of a device has the state of the last readback.
+    fn host(&self) -> &dyn ErasedSolver;
+
+    /// The solver on the CPU, to be edited. The state of a device is read back first; its next step takes the edits over.
+    fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error>;
+
     /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs on request.
     fn step(
         &mut self,
@@ -59,32 +67,53 @@ pub(crate) trait SolverBackend {
     fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
 
     /// Turns the measurement of forces on or off from the next frame on. A device measures none.
-    fn measure_forces(&mut self, measuring: bool);
+    fn measure_forces(&mut self, _measuring: bool) {}
 
     /// The mean forces of the last frame, if they were measured.
-    fn forces(&self) -> Option<Forces>;
+    fn forces(&self) -> Option<Forces> {
+        None
+    }
 
-    /// Sets the pose of a handle at the end of the next frame.
+    /// Sets the pose of a handle at the end of the next frame, without a readback.
     fn move_handle(&mut self, handle: u32, pose: Pose);
 
     /// Bytes of a copy.
-    fn bytes(&self) -> usize;
+    fn bytes(&self) -> usize {
+        self.host().bytes()
+    }
 
     /// The largest speed in m/s, unless the state is on a device.
-    fn host_max_speed(&self) -> Option<f64>;
+    fn host_max_speed(&self) -> Option<f64> {
+        None
+    }
 
     /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
-    fn update_vbd(&mut self, changed: Option<&[u32]>, ms: &mut Milliseconds) -> Result<(), Error>;
+    fn update_vbd(
+        &mut self,
+        _changed: Option<&[u32]>,
+        _ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        Ok(())
+    }
 
     /// The error that the last frame of two-level VBD left over.
-    fn vbd_error(&self) -> Option<f64>;
+    fn vbd_error(&self) -> Option<f64> {
+        None
+    }
 
     /// Drops the data of VBD.
-    fn end_vbd(&mut self);
+    fn end_vbd(&mut self) {}
 
     /// Makes the state of a device known here; returns how many particles it had to put back since the last time.
-    fn read_back(&mut self) -> Result<usize, Error>;
+    fn read_back(&mut self) -> Result<usize, Error> {
+        Ok(0)
+    }
 
     /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
-    fn take_repaired(&mut self) -> usize;
+    fn take_repaired(&mut self) -> usize {
+        0
+    }
+
+    /// Recomputes the data of VBD or of a device and compares.
+    fn check(&self, schedule: &Schedule) -> Result<(), Error>;
 }
