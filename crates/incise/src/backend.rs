@@ -4,6 +4,7 @@
 //! [`ErasedSolver`] behind it, in either precision.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use incise_cutting::{CutDelta, CuttableMesh};
@@ -14,8 +15,7 @@ use web_time::Instant;
 
 use crate::Error;
 use crate::compute_device::ComputeDevice;
-#[cfg(feature = "gpu")]
-use crate::device::Device;
+use crate::device::{Device, GpuContext};
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec};
 use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
@@ -27,7 +27,6 @@ use crate::vbd::Vbd;
 pub(crate) enum AnySolver {
     Single(Backend<f32>),
     Double(Backend<f64>),
-    #[cfg(feature = "gpu")]
     #[cfg_attr(feature = "save", serde(skip))]
     Device(Box<Device>),
 }
@@ -48,9 +47,8 @@ impl Clone for AnySolver {
         match self {
             Self::Single(backend) => Self::Single(backend.clone()),
             Self::Double(backend) => Self::Double(backend.clone()),
-            #[cfg(feature = "gpu")]
             Self::Device(device) => Self::Single(Backend {
-                solver: device.solver.cached_host().clone(),
+                solver: device.cached_host().clone(),
                 vbd: None,
             }),
         }
@@ -62,8 +60,7 @@ impl AnySolver {
         match self {
             Self::Single(backend) => backend,
             Self::Double(backend) => backend,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => &**device,
+            Self::Device(device) => device.backend(),
         }
     }
 
@@ -71,8 +68,7 @@ impl AnySolver {
         match self {
             Self::Single(backend) => backend,
             Self::Double(backend) => backend,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => &mut **device,
+            Self::Device(device) => device.backend_mut(),
         }
     }
 
@@ -114,8 +110,7 @@ impl AnySolver {
         match self {
             Self::Single(backend) => Some(&backend.solver),
             Self::Double(_) => None,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => Some(device.solver.cached_host()),
+            Self::Device(device) => Some(device.cached_host()),
         }
     }
 
@@ -183,24 +178,16 @@ impl AnySolver {
         spec: &SolverSpec,
         compute_device: &ComputeDevice,
     ) -> Result<(), Error> {
-        #[cfg(feature = "gpu")]
-        if let Some(gpu) = &compute_device.gpu {
-            return self.take_to(gpu, spec);
-        }
-        debug_assert!(!compute_device.is_gpu(), "a device was prepared");
-        match self {
-            Self::Single(backend) => backend.prepare(spec),
-            Self::Double(backend) => backend.prepare(spec),
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => Ok(()),
+        match &compute_device.gpu {
+            Some(gpu) => self.take_to(gpu, spec),
+            None => self.backend_mut().prepare(spec),
         }
     }
 
     /// Takes a solver in single precision to a device.
-    #[cfg(feature = "gpu")]
     pub(crate) fn take_to(
         &mut self,
-        gpu: &std::sync::Arc<incise_gpu::GpuContext>,
+        gpu: &Arc<GpuContext>,
         spec: &SolverSpec,
     ) -> Result<(), Error> {
         // Any other one will do: it is replaced at once.
@@ -244,16 +231,10 @@ impl AnySolver {
         compute_device: &ComputeDevice,
         spec: &SolverSpec,
     ) -> Result<bool, Error> {
-        #[cfg(feature = "gpu")]
-        return match (self, &compute_device.gpu) {
+        match (self, &compute_device.gpu) {
             (Self::Device(device), Some(gpu)) => device.serves(gpu, spec),
             (Self::Device(_), None) | (_, Some(_)) => Ok(false),
             (_, None) => Ok(true),
-        };
-        #[cfg(not(feature = "gpu"))]
-        {
-            let _ = spec;
-            Ok(!compute_device.is_gpu())
         }
     }
 
@@ -284,15 +265,6 @@ impl AnySolver {
         layout.map_err(|error| Error::Inconsistent(error.to_string()))?;
         self.backend().check(schedule)
     }
-
-    /// The solver on a device, if it is on one.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn device(&self) -> Option<&incise_gpu::GpuSolver> {
-        match self {
-            Self::Device(device) => Some(&device.solver),
-            _ => None,
-        }
-    }
 }
 
 impl<R: Real> Backend<R> {
@@ -301,13 +273,6 @@ impl<R: Real> Backend<R> {
             solver: Solver::new(positions),
             vbd: None,
         }
-    }
-
-    fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
-        if spec.method == Method::Vbd {
-            self.vbd = Some(Vbd::new(&self.solver, spec)?);
-        }
-        Ok(())
     }
 }
 
@@ -318,6 +283,13 @@ impl<R: Real> SolverBackend for Backend<R> {
 
     fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
         Ok(&mut self.solver)
+    }
+
+    fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
+        if spec.method == Method::Vbd {
+            self.vbd = Some(Vbd::new(&self.solver, spec)?);
+        }
+        Ok(())
     }
 
     fn step(

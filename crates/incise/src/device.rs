@@ -8,15 +8,40 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use incise_clustering::Method;
-use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
+pub(crate) use incise_gpu::GpuContext;
+use incise_gpu::{ClusterMapping, GpuOptions, GpuSolver};
 use incise_graph::Schedule;
 use incise_xpbd::{ErasedSolver, Pose, Solver, StepReport, StepSettings};
 use web_time::Instant;
 
 use crate::Error;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::{Quantity, SolverSpec};
+use crate::scene::{Backend, Quantity, SolverSpec};
 use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
+
+/// A device that is open, if one is.
+pub(crate) type OpenDevice = Option<Arc<GpuContext>>;
+
+/// Takes the open device or opens one, with its name; with `auto` none, and why, if there is no hardware device.
+pub(crate) fn open(
+    backend: Backend,
+    open_device: &OpenDevice,
+) -> Result<(OpenDevice, String), Error> {
+    let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
+    match open_device.clone().map_or_else(open, Ok) {
+        Ok(gpu) => {
+            let adapter = gpu.adapter();
+            if backend == Backend::Auto && adapter.software {
+                let reason = format!("the only GPU is software ({})", adapter.name);
+                return Ok((None, reason));
+            }
+            let name = format!("{} ({})", adapter.name, adapter.backend);
+            Ok((Some(gpu), name))
+        }
+        Err(error) if backend == Backend::Auto => Ok((None, error.to_string())),
+        Err(error) => Err(error.into()),
+    }
+}
 
 /// A solver on a GPU.
 #[derive(Debug)]
@@ -41,6 +66,24 @@ impl Device {
     /// Returns whether the solver is on a device and solves tets as the settings ask for.
     pub(crate) fn serves(&self, gpu: &Arc<GpuContext>, spec: &SolverSpec) -> Result<bool, Error> {
         Ok(Arc::ptr_eq(self.solver.gpu(), gpu) && self.solver.cluster_mapping() == mapping(spec)?)
+    }
+
+    /// The host's solver with the state of the last readback.
+    pub(crate) fn cached_host(&self) -> &Solver<f32> {
+        self.solver.cached_host()
+    }
+
+    /// Takes another solver to the device, in the memory of the present one.
+    pub(crate) fn replace(&mut self, host: Solver<f32>) {
+        self.solver.replace(host);
+    }
+
+    pub(crate) fn backend(&self) -> &dyn SolverBackend {
+        self
+    }
+
+    pub(crate) fn backend_mut(&mut self) -> &mut dyn SolverBackend {
+        self
     }
 }
 

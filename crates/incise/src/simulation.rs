@@ -7,6 +7,8 @@ mod builder;
 mod edit;
 mod forces;
 mod interaction;
+#[cfg(feature = "gpu")]
+mod on_device;
 mod readback;
 mod set_solver;
 mod snapshot;
@@ -26,7 +28,8 @@ use web_time::Instant;
 use crate::attachment::Support;
 use crate::budget;
 use crate::collider::Colliders;
-use crate::compute_device::{ComputeDevice, OpenDevice};
+use crate::compute_device::ComputeDevice;
+use crate::device::OpenDevice;
 use crate::island::Island;
 use crate::island_builder::IslandBuilder;
 use crate::islands::island_of_bodies;
@@ -112,18 +115,6 @@ impl Simulation {
     pub fn with_threads(scene: &Scene, threads: usize) -> Result<Self, Error> {
         let mut builder = SimulationBuilder::from_scene(scene.clone());
         builder.threads(threads);
-        builder.build()
-    }
-
-    /// Creates a simulation of a scene on an open device, such as that of a renderer or of another simulation;
-    /// `solver.backend` is ignored.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Simulation::new`], and one if the device does not support the scene's settings.
-    #[cfg(feature = "gpu")]
-    pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
-        let mut builder = SimulationBuilder::from_scene(scene.clone());
-        builder.device(gpu);
         builder.build()
     }
 

@@ -10,7 +10,7 @@ use incise_xpbd::{
 
 use crate::Error;
 use crate::report::Milliseconds;
-use crate::scene::Quantity;
+use crate::scene::{Quantity, SolverSpec};
 
 /// Residuals of the last substep; XPBD has more of them than VBD.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,11 @@ pub(crate) trait SolverBackend {
 
     /// The solver on the CPU, to be edited. The state of a device is read back first; its next step takes the edits over.
     fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error>;
+
+    /// Prepares the data of VBD, if the settings ask for it.
+    fn prepare(&mut self, _spec: &SolverSpec) -> Result<(), Error> {
+        Ok(())
+    }
 
     /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs on request.
     fn step(

@@ -227,16 +227,6 @@ impl Simulation {
         }
     }
 
-    /// Returns the device solvers of the islands of bodies, for renderers; none on the CPU. [`Simulation::location_of`]
-    /// maps particles to them.
-    #[cfg(feature = "gpu")]
-    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
-        self.state
-            .islands
-            .iter()
-            .filter_map(|island| island.solver.device())
-    }
-
     /// The forces between pieces that touched in the last frame, in a scene with contact, ascending by island and pieces.
     /// A piece that touches itself is not listed. O(pieces that touch).
     ///
