@@ -9,6 +9,7 @@
 //! Cost: one thread per triangle for the normals, four samples per pixel.
 
 mod buffer;
+mod open;
 mod pipelines;
 mod shaders;
 mod target;
@@ -20,6 +21,7 @@ use incise::Simulation;
 use incise::gpu::wgpu::{self, BindingResource};
 use incise::gpu::{GpuContext, GpuSolver};
 
+pub(crate) use open::{is_on_device, open, open_for};
 pub use shaders::{Shader, shaders};
 
 use crate::view::View;
@@ -109,7 +111,7 @@ impl GpuRenderer {
     #[must_use]
     pub fn needs_read_back(&self, render_scene: &RenderScene, simulation: &Simulation) -> bool {
         let mut solvers = simulation.device_solvers();
-        let current = render_scene.device_is_current();
+        let current = render_scene.device_is_current;
         solvers.any(|solver| !current || !Arc::ptr_eq(solver.gpu(), &self.gpu))
     }
 
@@ -133,7 +135,7 @@ impl GpuRenderer {
         style: &Style,
         size: [u32; 2],
     ) -> Result<&wgpu::TextureView, RenderError> {
-        let solvers = if render_scene.device_is_current() {
+        let solvers = if render_scene.device_is_current {
             solvers_here(&self.gpu, simulation)
         } else {
             Vec::new()
