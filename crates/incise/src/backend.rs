@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{ErasedSolver, Forces, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
+use incise_xpbd::{ErasedSolver, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
 use web_time::Instant;
 
 use crate::Error;
@@ -47,10 +47,7 @@ impl Clone for AnySolver {
         match self {
             Self::Single(backend) => Self::Single(backend.clone()),
             Self::Double(backend) => Self::Double(backend.clone()),
-            Self::Device(device) => Self::Single(Backend {
-                solver: device.cached_host().clone(),
-                vbd: None,
-            }),
+            Self::Device(device) => Self::Single(Backend::new(device.cached_host().clone())),
         }
     }
 }
@@ -85,8 +82,8 @@ impl AnySolver {
     /// A solver with particles, and nothing else yet.
     pub(crate) fn of_particles(precision: Precision, positions: &[DVec3]) -> Self {
         match precision {
-            Precision::F32 | Precision::Auto => Self::Single(Backend::new(positions)),
-            Precision::F64 => Self::Double(Backend::new(positions)),
+            Precision::F32 | Precision::Auto => Self::Single(Backend::new(Solver::new(positions))),
+            Precision::F64 => Self::Double(Backend::new(Solver::new(positions))),
         }
     }
 
@@ -94,15 +91,14 @@ impl AnySolver {
     /// other constraints and the data of a method: see [`Solver::joined_with`]. Uses the last readback of a device.
     pub(crate) fn joined_with(&self, other: &Self) -> Result<Self, Error> {
         if let (Self::Double(one), Self::Double(other)) = (self, other) {
-            let (solver, vbd) = (one.solver.joined_with(&other.solver), None);
-            return Ok(Self::Double(Backend { solver, vbd }));
+            let both = one.solver.joined_with(&other.solver);
+            return Ok(Self::Double(Backend::new(both)));
         }
         let (Some(one), Some(other)) = (self.single(), other.single()) else {
             let what = "bodies in different precisions are joined";
             return Err(Error::Inconsistent(what.into()));
         };
-        let (solver, vbd) = (one.joined_with(other), None);
-        Ok(Self::Single(Backend { solver, vbd }))
+        Ok(Self::Single(Backend::new(one.joined_with(other))))
     }
 
     /// The solver in single precision, if it is in that.
@@ -191,7 +187,7 @@ impl AnySolver {
         spec: &SolverSpec,
     ) -> Result<(), Error> {
         // Any other one will do: it is replaced at once.
-        let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
+        let single = std::mem::replace(self, Self::Double(Backend::new(Solver::new(&[]))));
         if let Self::Single(Backend { solver, .. }) = single {
             *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
         }
@@ -268,11 +264,8 @@ impl AnySolver {
 }
 
 impl<R: Real> Backend<R> {
-    fn new(positions: &[DVec3]) -> Self {
-        Self {
-            solver: Solver::new(positions),
-            vbd: None,
-        }
+    fn new(solver: Solver<R>) -> Self {
+        Self { solver, vbd: None }
     }
 }
 
@@ -296,25 +289,14 @@ impl<R: Real> SolverBackend for Backend<R> {
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
+        part: Range<u32>,
         keep: bool,
     ) -> Result<StepReport, Error> {
         let Self { solver, vbd } = self;
         let step = match vbd {
             Some(vbd) => vbd.step(solver, settings, keep),
-            None if keep => solver.step_keeping_residuals(schedule, settings),
-            None => solver.step(schedule, settings),
+            None => solver.step_part(schedule, settings, part, keep),
         };
-        step.map_err(Error::xpbd("solver"))
-    }
-
-    fn step_part(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-        part: Range<u32>,
-        keep: bool,
-    ) -> Result<StepReport, Error> {
-        let step = self.solver.step_part(schedule, settings, part, keep);
         step.map_err(Error::xpbd("solver"))
     }
 
@@ -347,19 +329,12 @@ impl<R: Real> SolverBackend for Backend<R> {
                 force: vbd.last.force?,
                 potential: vbd.last.potential?,
             }),
-            None => self
-                .solver
-                .residuals(substep_time)
-                .map(LastSubstep::Constraints),
+            None => (self.solver.residuals(substep_time)).map(LastSubstep::Constraints),
         }
     }
 
     fn measure_forces(&mut self, measuring: bool) {
         self.solver.measure_forces(measuring);
-    }
-
-    fn forces(&self) -> Option<Forces> {
-        self.solver.forces()
     }
 
     fn move_handle(&mut self, handle: u32, pose: Pose) {
@@ -368,10 +343,6 @@ impl<R: Real> SolverBackend for Backend<R> {
 
     fn bytes(&self) -> usize {
         self.solver.bytes() + self.vbd.as_ref().map_or(0, Vbd::bytes)
-    }
-
-    fn host_max_speed(&self) -> Option<f64> {
-        Some(self.solver.max_speed())
     }
 
     fn update_vbd(&mut self, changed: Option<&[u32]>, ms: &mut Milliseconds) -> Result<(), Error> {

@@ -17,7 +17,7 @@ use web_time::Instant;
 use crate::Error;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Backend, Quantity, SolverSpec};
-use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
+use crate::solver_backend::{Measures, SolverBackend};
 
 /// A device that is open, if one is.
 pub(crate) type OpenDevice = Option<Arc<GpuContext>>;
@@ -100,28 +100,11 @@ impl SolverBackend for Device {
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
-        keep: bool,
-    ) -> Result<StepReport, Error> {
-        if keep {
-            self.solver.step_keeping_residuals(schedule, settings)?;
-        } else {
-            self.solver.step(schedule, settings)?;
-        }
-        Ok(StepReport::default())
-    }
-
-    fn step_part(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
         part: Range<u32>,
         keep: bool,
     ) -> Result<StepReport, Error> {
         self.solver.step_part(schedule, settings, part, keep)?;
-        Ok(StepReport {
-            repaired: self.read_back()?,
-            ..StepReport::default()
-        })
+        Ok(StepReport::default())
     }
 
     fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {
@@ -139,11 +122,6 @@ impl SolverBackend for Device {
             volume: Some(measures.volume),
             max_speed: Some(measures.max_speed),
         })
-    }
-
-    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
-        let residuals = self.solver.cached_host().residuals(substep_time);
-        residuals.map(LastSubstep::Constraints)
     }
 
     fn move_handle(&mut self, handle: u32, pose: Pose) {

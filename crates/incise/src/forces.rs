@@ -35,7 +35,7 @@ impl Measured {
         body_of_tet: impl Fn(TetId) -> usize,
         strokes: impl Iterator<Item = u32>,
     ) -> Option<Box<Self>> {
-        let forces = solver.backend().forces()?;
+        let forces = solver.host().forces()?;
         let mut fixed = BTreeMap::new();
         for (p, force) in forces.fixed {
             let mut around = mesh.around(ParticleId(p));

@@ -95,7 +95,10 @@ impl Grabs {
         let Some(active) = self.find(grab) else {
             return Ok(false);
         };
-        detach(solver, active.handle)?;
+        solver.edit()?.detach_all(active.handle);
+        // Handles go back to where they began, so that their ways do not add up from grab to grab.
+        let start = Pose::at(DVec3::ZERO);
+        solver.backend_mut().move_handle(active.handle, start);
         active.held = false;
         Ok(true)
     }
@@ -156,14 +159,4 @@ impl Grabs {
             Err(Error::Inconsistent(what))
         })
     }
-}
-
-/// Detaches all particles from a handle and sends it back to where it began, so that its way does not add up from grab
-/// to grab.
-fn detach(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
-    solver.edit()?.detach_all(handle);
-    solver
-        .backend_mut()
-        .move_handle(handle, Pose::at(DVec3::ZERO));
-    Ok(())
 }

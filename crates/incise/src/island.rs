@@ -167,10 +167,7 @@ impl Island {
         mut joined: IslandBuilder,
     ) -> Result<Self, Error> {
         let mesh = std::mem::take(&mut joined.mesh);
-        let mut cuttable = CuttableMesh::new(mesh).map_err(|source| Error::Cut {
-            field: "body".into(),
-            source,
-        })?;
+        let mut cuttable = CuttableMesh::new(mesh).map_err(Error::cut("body"))?;
         // In a scene with contact improvement leaves the boundary alone.
         cuttable.record_opened_faces(scene.cutting.improve && scene.contact.is_none());
         let mut solver = joined.solver(precision, &cuttable)?;
@@ -295,8 +292,8 @@ impl Island {
             self.step_with_contact(keeping_residuals)
         } else {
             let (schedule, settings) = (&self.partition.schedule, &self.settings);
-            let backend = self.solver.backend_mut();
-            backend.step(schedule, settings, keeping_residuals)
+            let (backend, whole) = (self.solver.backend_mut(), 0..settings.substeps);
+            backend.step(schedule, settings, whole, keeping_residuals)
         };
         // Also after an error: no blade may stay behind.
         if !self.constraints.blades.is_empty() {
@@ -362,8 +359,8 @@ impl Island {
             contacts.update(solver, cuttable, pieces, time / f64::from(parts))?;
             let (schedule, range) = (&partition.schedule, end(part)..end(part + 1));
             let backend = solver.backend_mut();
-            let step = backend.step_part(schedule, settings, range, keeping_residuals)?;
-            report.repaired += step.repaired;
+            let step = backend.step(schedule, settings, range, keeping_residuals)?;
+            report.repaired += step.repaired + backend.read_back()?;
             report.jittered += step.jittered;
             contacts.note(solver, cuttable, pieces);
         }
@@ -394,10 +391,7 @@ impl Island {
     pub(crate) fn remove_tets_of(&mut self, body: usize) -> Result<CutDelta, Error> {
         let all = (0..self.cuttable.mesh().tets.len()).map(TetId::new);
         let tets: Vec<TetId> = all.filter(|&t| self.body_of_tet(t) == body).collect();
-        remove_tets(&mut self.cuttable, &tets, 0).map_err(|source| Error::Cut {
-            field: "body".into(),
-            source,
-        })
+        remove_tets(&mut self.cuttable, &tets, 0).map_err(Error::cut("body"))
     }
 
     /// For each material what its body, given by its number in the scene, asks for.
@@ -627,10 +621,7 @@ impl Island {
                 || corners.any(|p| !solver.is_free(p.index()))
         };
         let improved = improve(cuttable, positions, near, &options, is_locked);
-        improved.map_err(|source| Error::Cut {
-            field: "cutting.improve".into(),
-            source,
-        })
+        improved.map_err(Error::cut("cutting.improve"))
     }
 
     /// Applies a delta to solver, pieces, clusters, colors, schedule and volume constraints, and wakes the island.
@@ -730,10 +721,7 @@ impl Island {
 
     /// Recomputes everything derived and compares.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        self.cuttable.check().map_err(|source| Error::Cut {
-            field: "mesh".into(),
-            source,
-        })?;
+        self.cuttable.check().map_err(Error::cut("mesh"))?;
         let mesh = self.cuttable.mesh();
         let (initial, volume) = (self.initial_volume, mesh.total_volume());
         let farthest = |far: f64, x: &DVec3| far.max(x.abs().max_element());

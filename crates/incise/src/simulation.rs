@@ -428,9 +428,9 @@ impl Simulation {
                 .report
                 .warnings
                 .append(&mut island.judged.warnings);
-            let speed = match island.solver.backend().host_max_speed() {
-                Some(speed) => speed,
-                None => self.state.report.max_speed.unwrap_or(0.0),
+            let speed = match self.state.compute_device.gpu {
+                Some(_) => self.state.report.max_speed.unwrap_or(0.0),
+                None => island.solver.host().max_speed(),
             };
             if island.is_absurd(speed, elapsed) {
                 let message = format!(

@@ -4,9 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 use incise_graph::Schedule;
-use incise_xpbd::{
-    Energy, ErasedSolver, Forces, Pose, Residuals, StepReport, StepSettings, Volume,
-};
+use incise_xpbd::{Energy, ErasedSolver, Pose, Residuals, StepReport, StepSettings, Volume};
 
 use crate::Error;
 use crate::report::Milliseconds;
@@ -43,16 +41,9 @@ pub(crate) trait SolverBackend {
         Ok(())
     }
 
-    /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs on request.
+    /// Advances by some of the substeps of a frame, of VBD by the whole frame, keeping what
+    /// [`SolverBackend::last_substep`] needs on request. The state of a device stays there.
     fn step(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-        keep: bool,
-    ) -> Result<StepReport, Error>;
-
-    /// Advances by some of the substeps of a frame; the state is known here afterwards, so that contacts can be found.
-    fn step_part(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
@@ -69,15 +60,13 @@ pub(crate) trait SolverBackend {
     -> Result<Measures, Error>;
 
     /// The residuals of the last substep, if they were kept.
-    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
+    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
+        let residuals = self.host().residuals(substep_time);
+        residuals.map(LastSubstep::Constraints)
+    }
 
     /// Turns the measurement of forces on or off from the next frame on. A device measures none.
     fn measure_forces(&mut self, _measuring: bool) {}
-
-    /// The mean forces of the last frame, if they were measured.
-    fn forces(&self) -> Option<Forces> {
-        None
-    }
 
     /// Sets the pose of a handle at the end of the next frame, without a readback.
     fn move_handle(&mut self, handle: u32, pose: Pose);
@@ -85,11 +74,6 @@ pub(crate) trait SolverBackend {
     /// Bytes of a copy.
     fn bytes(&self) -> usize {
         self.host().bytes()
-    }
-
-    /// The largest speed in m/s, unless the state is on a device.
-    fn host_max_speed(&self) -> Option<f64> {
-        None
     }
 
     /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
