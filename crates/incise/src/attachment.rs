@@ -9,7 +9,7 @@ use glam::{DQuat, DVec3};
 use incise_xpbd::Pose;
 
 use crate::Error;
-use crate::backend::{AnySolver, each, each_mut};
+use crate::backend::AnySolver;
 use crate::collider::rotation;
 use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
@@ -154,38 +154,37 @@ impl Attachment {
     ) -> Result<(), Error> {
         let field = &self.field;
         let (pose, compliance) = (self.pose(frame), self.spec.compliance);
-        each_mut!(solver, solver => {
-            if self.particles.iter().any(|&p| solver.handle_of(p).is_some()) {
-                let what = "a region with a particle of another attachment";
-                let range = "particles that nothing else holds";
-                return Err(value(format!("{field}.regions"), what, range));
+        let solver = solver.edit()?;
+        if (self.particles.iter()).any(|&p| solver.handle_of(p).is_some()) {
+            let what = "a region with a particle of another attachment";
+            let range = "particles that nothing else holds";
+            return Err(value(format!("{field}.regions"), what, range));
+        }
+        self.number = match spare {
+            Some(number) => {
+                solver.set_handle(number, pose);
+                number
             }
-            self.number = match spare {
-                Some(number) => {
-                    solver.set_handle(number, pose);
-                    number
-                }
-                None => solver.add_handle(pose),
-            };
-            for &p in &self.particles {
-                self.middle += solver.position(p) / self.particles.len() as f64;
-                solver
-                    .attach(p, self.number, compliance, 0.0)
-                    .map_err(|source| Error::Xpbd { field: field.clone(), source })?;
-            }
-        });
+            None => solver.add_handle(pose),
+        };
+        for &p in &self.particles {
+            self.middle += solver.position(p) / self.particles.len() as f64;
+            let attached = solver.attach(p, self.number, compliance, 0.0);
+            attached.map_err(Error::xpbd(field))?;
+        }
         self.center = pose.rotation.conjugate() * (self.middle - pose.position);
         Ok(())
     }
 
     /// Where its frame has carried the center of the particles that were attached at first, in m.
     pub(crate) fn center(&self, solver: &AnySolver) -> DVec3 {
-        each!(solver, solver => solver.handle(self.number)).apply(self.center)
+        solver.host().handle(self.number).apply(self.center)
     }
 
     /// Detaches all its particles, those that cuts made too.
     pub(crate) fn detach(&self, solver: &mut AnySolver) -> Result<(), Error> {
-        detach_all(solver, self.number)
+        solver.edit()?.detach_all(self.number);
+        Ok(())
     }
 
     /// Sets the compliance of all its particles in m/N, those that cuts made too; they stay where they are.
@@ -196,12 +195,8 @@ impl Attachment {
     ) -> Result<(), Error> {
         check_compliance(&self.field, compliance)?;
         self.spec.compliance = compliance;
-        each_mut!(solver, solver => {
-            solver
-                .set_compliance(self.number, compliance)
-                .map_err(|source| Error::Xpbd { field: self.field.clone(), source })?;
-        });
-        Ok(())
+        let set = solver.edit()?.set_compliance(self.number, compliance);
+        set.map_err(Error::xpbd(&self.field))
     }
 
     /// Goes within the next frame to where its particles, had they stayed as they were when they were attached, are turned
@@ -263,18 +258,5 @@ impl Attachment {
 
 fn check_compliance(field: &str, compliance: f64) -> Result<(), Error> {
     within(&format!("{field}.compliance"), compliance, 0.0, 1e9)?;
-    Ok(())
-}
-
-/// Detaches all particles from a frame of the solver.
-pub(crate) fn detach_all(solver: &mut AnySolver, number: u32) -> Result<(), Error> {
-    each_mut!(solver, solver => {
-        let all = solver.attachments();
-        let held: Vec<u32> = all.filter(|a| a.handle == number).map(|a| a.particle).collect();
-        // The list of attachments closes up behind each of them.
-        for p in held.into_iter().rev() {
-            solver.detach(p as usize);
-        }
-    });
     Ok(())
 }

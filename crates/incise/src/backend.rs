@@ -1,21 +1,21 @@
 //! [`AnySolver`]: the solver of an island in either precision or on a device, and its update after a cut.
 //!
-//! Functions that depend on the device or the method are in [`SolverBackend`]. Edits and measurements that all solvers
-//! of `incise-xpbd` share are written once, for either precision, with `each!` and `each_mut!`.
+//! Functions that depend on the device or the method are in [`SolverBackend`]. Edits and measurements are those of the
+//! [`ErasedSolver`] behind it, in either precision.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DMat3, DVec3};
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::{Forces, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
+use incise_xpbd::{ErasedSolver, KappaLimit, Pose, Real, Solver, StepReport, StepSettings};
 use web_time::Instant;
 
 use crate::Error;
 use crate::compute_device::ComputeDevice;
-#[cfg(feature = "gpu")]
-use crate::device::Device;
+use crate::device::{Device, GpuContext};
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec};
 use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
@@ -27,7 +27,6 @@ use crate::vbd::Vbd;
 pub(crate) enum AnySolver {
     Single(Backend<f32>),
     Double(Backend<f64>),
-    #[cfg(feature = "gpu")]
     #[cfg_attr(feature = "save", serde(skip))]
     Device(Box<Device>),
 }
@@ -48,68 +47,17 @@ impl Clone for AnySolver {
         match self {
             Self::Single(backend) => Self::Single(backend.clone()),
             Self::Double(backend) => Self::Double(backend.clone()),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => Self::Single(Backend {
-                solver: device.solver.cached_host().clone(),
-                vbd: None,
-            }),
+            Self::Device(device) => Self::Single(Backend::new(device.cached_host().clone())),
         }
     }
 }
-
-/// Evaluates an expression with the solver of any variant. On a device this is the host's solver, whose state is that
-/// of the last readback.
-macro_rules! each {
-    ($any:expr, $solver:ident => $body:expr) => {
-        match $any {
-            $crate::backend::AnySolver::Single($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            $crate::backend::AnySolver::Double($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            #[cfg(feature = "gpu")]
-            $crate::backend::AnySolver::Device(device) => {
-                let $solver = device.solver.cached_host();
-                $body
-            }
-        }
-    };
-}
-pub(crate) use each;
-
-/// Evaluates an expression with the solver of any variant, mutable, in a function that may return an error. The state
-/// of a device is read back first.
-macro_rules! each_mut {
-    ($any:expr, $solver:ident => $body:expr) => {
-        match $any {
-            $crate::backend::AnySolver::Single($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            $crate::backend::AnySolver::Double($crate::backend::Backend {
-                solver: $solver,
-                ..
-            }) => $body,
-            #[cfg(feature = "gpu")]
-            $crate::backend::AnySolver::Device(device) => {
-                let $solver = device.solver.edit()?;
-                $body
-            }
-        }
-    };
-}
-pub(crate) use each_mut;
 
 impl AnySolver {
     pub(crate) fn backend(&self) -> &dyn SolverBackend {
         match self {
             Self::Single(backend) => backend,
             Self::Double(backend) => backend,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => &**device,
+            Self::Device(device) => device.backend(),
         }
     }
 
@@ -117,16 +65,25 @@ impl AnySolver {
         match self {
             Self::Single(backend) => backend,
             Self::Double(backend) => backend,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => &mut **device,
+            Self::Device(device) => device.backend_mut(),
         }
+    }
+
+    /// The solver on the CPU, to be read: [`SolverBackend::host`].
+    pub(crate) fn host(&self) -> &dyn ErasedSolver {
+        self.backend().host()
+    }
+
+    /// The solver on the CPU, to be edited: [`SolverBackend::edit`].
+    pub(crate) fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
+        self.backend_mut().edit()
     }
 
     /// A solver with particles, and nothing else yet.
     pub(crate) fn of_particles(precision: Precision, positions: &[DVec3]) -> Self {
         match precision {
-            Precision::F32 | Precision::Auto => Self::Single(Backend::new(positions)),
-            Precision::F64 => Self::Double(Backend::new(positions)),
+            Precision::F32 | Precision::Auto => Self::Single(Backend::new(Solver::new(positions))),
+            Precision::F64 => Self::Double(Backend::new(Solver::new(positions))),
         }
     }
 
@@ -134,15 +91,14 @@ impl AnySolver {
     /// other constraints and the data of a method: see [`Solver::joined_with`]. Uses the last readback of a device.
     pub(crate) fn joined_with(&self, other: &Self) -> Result<Self, Error> {
         if let (Self::Double(one), Self::Double(other)) = (self, other) {
-            let (solver, vbd) = (one.solver.joined_with(&other.solver), None);
-            return Ok(Self::Double(Backend { solver, vbd }));
+            let both = one.solver.joined_with(&other.solver);
+            return Ok(Self::Double(Backend::new(both)));
         }
         let (Some(one), Some(other)) = (self.single(), other.single()) else {
             let what = "bodies in different precisions are joined";
             return Err(Error::Inconsistent(what.into()));
         };
-        let (solver, vbd) = (one.joined_with(other), None);
-        Ok(Self::Single(Backend { solver, vbd }))
+        Ok(Self::Single(Backend::new(one.joined_with(other))))
     }
 
     /// The solver in single precision, if it is in that.
@@ -150,8 +106,7 @@ impl AnySolver {
         match self {
             Self::Single(backend) => Some(&backend.solver),
             Self::Double(_) => None,
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => Some(device.solver.cached_host()),
+            Self::Device(device) => Some(device.cached_host()),
         }
     }
 
@@ -162,54 +117,54 @@ impl AnySolver {
         cuttable: &CuttableMesh,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
-        each_mut!(self, solver => {
-            for point in &delta.points {
-                let [a, b] = point.ends.map(ParticleId::index);
-                solver.push_particle_between(a, b, point.parameter);
-            }
-            for source in &delta.copies {
-                solver.push_copy(source.index());
-            }
-            let mut added: Vec<_> = delta.added.iter().collect();
-            added.sort_unstable_by_key(|tet| tet.tet);
-            for tet in added {
-                let corners = tet.corners.map(|p| p.0);
-                let rest = tet.corners.map(|p| mesh.positions[p.index()]);
-                if tet.tet.index() < solver.tet_count() {
-                    solver.replace_tet(tet.tet.index(), corners, rest);
-                } else {
-                    solver.push_tet(corners, rest, solver.material_of(tet.parent.index()));
-                }
-            }
-            for tet in &delta.relinked {
-                solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
-            }
-            for tet in &delta.moved {
-                solver.move_tet(tet.from.index(), tet.to.index());
-            }
-            solver.truncate_tets(delta.tets_after());
-            let mut star = Vec::new();
-            let touched = touched(delta);
-            let regions = if delta.collapsed > 0 {
-                regions(delta, &touched)
+        let solver = self.edit()?;
+        for point in &delta.points {
+            let [a, b] = point.ends.map(ParticleId::index);
+            solver.push_particle_between(a, b, point.parameter);
+        }
+        for source in &delta.copies {
+            solver.push_copy(source.index());
+        }
+        let mut added: Vec<_> = delta.added.iter().collect();
+        added.sort_unstable_by_key(|tet| tet.tet);
+        for tet in added {
+            let corners = tet.corners.map(|p| p.0);
+            let rest = tet.corners.map(|p| mesh.positions[p.index()]);
+            if tet.tet.index() < solver.tet_count() {
+                solver.replace_tet(tet.tet.index(), corners, rest);
             } else {
-                Vec::new()
-            };
-            let momenta: Vec<Momentum> = regions.iter().map(|region| Momentum::of(solver, region)).collect();
-            for &p in &touched {
-                let mass = mass(solver, cuttable, p, &mut star);
-                solver.set_mass_in_star(p.index(), mass, star.iter().map(|tet| tet.index()));
+                solver.push_tet(corners, rest, solver.material_of(tet.parent.index()));
             }
-            for (region, before) in regions.iter().zip(momenta) {
-                before.restore(solver, region);
+        }
+        for tet in &delta.relinked {
+            solver.relink_tet(tet.tet.index(), tet.after.map(|p| p.0));
+        }
+        for tet in &delta.moved {
+            solver.move_tet(tet.from.index(), tet.to.index());
+        }
+        solver.truncate_tets(delta.tets_after());
+        let mut star = Vec::new();
+        let touched = touched(delta);
+        let regions = if delta.collapsed > 0 {
+            regions(delta, &touched)
+        } else {
+            Vec::new()
+        };
+        let momentum = |region: &Vec<ParticleId>| Momentum::of(solver, region);
+        let momenta: Vec<Momentum> = regions.iter().map(momentum).collect();
+        for &p in &touched {
+            let mass = mass(solver, cuttable, p, &mut star);
+            solver.set_mass_in_star(p.index(), mass, &mut star.iter().map(|tet| tet.index()));
+        }
+        for (region, before) in regions.iter().zip(momenta) {
+            before.restore(solver, region);
+        }
+        // Particles that lost all their tets stay where they are.
+        for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
+            if cuttable.around(p).next().is_none() {
+                solver.set_velocity(p.index(), DVec3::ZERO);
             }
-            // Particles that lost all their tets stay where they are.
-            for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
-                if cuttable.around(p).next().is_none() {
-                    solver.set_velocity(p.index(), DVec3::ZERO);
-                }
-            }
-        });
+        }
         Ok(())
     }
 
@@ -219,28 +174,20 @@ impl AnySolver {
         spec: &SolverSpec,
         compute_device: &ComputeDevice,
     ) -> Result<(), Error> {
-        #[cfg(feature = "gpu")]
-        if let Some(gpu) = &compute_device.gpu {
-            return self.take_to(gpu, spec);
-        }
-        debug_assert!(!compute_device.is_gpu(), "a device was prepared");
-        match self {
-            Self::Single(backend) => backend.prepare(spec),
-            Self::Double(backend) => backend.prepare(spec),
-            #[cfg(feature = "gpu")]
-            Self::Device(_) => Ok(()),
+        match &compute_device.gpu {
+            Some(gpu) => self.take_to(gpu, spec),
+            None => self.backend_mut().prepare(spec),
         }
     }
 
     /// Takes a solver in single precision to a device.
-    #[cfg(feature = "gpu")]
     pub(crate) fn take_to(
         &mut self,
-        gpu: &std::sync::Arc<incise_gpu::GpuContext>,
+        gpu: &Arc<GpuContext>,
         spec: &SolverSpec,
     ) -> Result<(), Error> {
         // Any other one will do: it is replaced at once.
-        let single = std::mem::replace(self, Self::Double(Backend::new(&[])));
+        let single = std::mem::replace(self, Self::Double(Backend::new(Solver::new(&[]))));
         if let Self::Single(Backend { solver, .. }) = single {
             *self = Self::Device(Box::new(Device::new(gpu, solver, spec)?));
         }
@@ -258,26 +205,20 @@ impl AnySolver {
         if before == limit {
             return Ok(());
         }
-        each_mut!(self, solver => {
-            solver.limit_kappa(limit);
-            for t in 0..solver.tet_count() {
-                if exceeds(solver, t, before) || exceeds(solver, t, limit) {
-                    solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
-                }
+        let solver = self.edit()?;
+        solver.limit_kappa(limit);
+        for t in 0..solver.tet_count() {
+            if exceeds(solver, t, before) || exceeds(solver, t, limit) {
+                solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
             }
-        });
+        }
         Ok(())
-    }
-
-    /// The residual of each tet in the last substep, if they were kept; VBD has none.
-    pub(crate) fn residuals_of_tets(&self, substep_time: f64) -> Option<Vec<f64>> {
-        each!(self, solver => solver.residuals_of_tets(substep_time))
     }
 
     /// Whether a limit softens a tet. O(tets).
     pub(crate) fn exceeds(&self, limit: Option<KappaLimit>) -> bool {
-        limit.is_some()
-            && each!(self, solver => (0..solver.tet_count()).any(|t| exceeds(solver, t, limit)))
+        let solver = self.host();
+        limit.is_some() && (0..solver.tet_count()).any(|t| exceeds(solver, t, limit))
     }
 
     /// Whether the solver is on a device with the cluster mapping of the settings.
@@ -286,81 +227,55 @@ impl AnySolver {
         compute_device: &ComputeDevice,
         spec: &SolverSpec,
     ) -> Result<bool, Error> {
-        #[cfg(feature = "gpu")]
-        return match (self, &compute_device.gpu) {
+        match (self, &compute_device.gpu) {
             (Self::Device(device), Some(gpu)) => device.serves(gpu, spec),
             (Self::Device(_), None) | (_, Some(_)) => Ok(false),
             (_, None) => Ok(true),
-        };
-        #[cfg(not(feature = "gpu"))]
-        {
-            let _ = spec;
-            Ok(!compute_device.is_gpu())
         }
     }
 
     /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
     pub(crate) fn check(&self, cuttable: &CuttableMesh, schedule: &Schedule) -> Result<(), Error> {
-        let mesh = cuttable.mesh();
-        each!(self, solver => {
-            if (solver.particle_count(), solver.tet_count()) != (mesh.positions.len(), mesh.tets.len()) {
-                return Err(Error::Inconsistent("the solver has another size than the mesh".into()));
-            }
-            for (t, tet) in mesh.tets.iter().enumerate() {
-                if solver.tet_particles(t) != tet.map(|p| p.0) {
-                    return Err(Error::Inconsistent(format!("tet {t} has other particles in the solver")));
-                }
-            }
-            let mut star = Vec::new();
-            for p in 0..mesh.positions.len() {
-                let fresh = mass(solver, cuttable, ParticleId::new(p), &mut star);
-                let stored = solver.mass(p);
-                if (stored - fresh).abs() > 1e-12 * fresh {
-                    return Err(Error::Inconsistent(format!("particle {p} has mass {stored} instead of {fresh}")));
-                }
-            }
-            solver.check_layout(schedule).map_err(|error| Error::Inconsistent(error.to_string()))?;
-        });
-        match self {
-            Self::Single(backend) => backend.check_vbd(),
-            Self::Double(backend) => backend.check_vbd(),
-            #[cfg(feature = "gpu")]
-            Self::Device(device) => Ok(device.solver.check(schedule)?),
+        let (mesh, solver) = (cuttable.mesh(), self.host());
+        let sizes = (solver.particle_count(), solver.tet_count());
+        if sizes != (mesh.positions.len(), mesh.tets.len()) {
+            let what = "the solver has another size than the mesh";
+            return Err(Error::Inconsistent(what.into()));
         }
-    }
-
-    /// The solver on a device, if it is on one.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn device(&self) -> Option<&incise_gpu::GpuSolver> {
-        match self {
-            Self::Device(device) => Some(&device.solver),
-            _ => None,
+        for (t, tet) in mesh.tets.iter().enumerate() {
+            if solver.tet_particles(t) != tet.map(|p| p.0) {
+                let what = format!("tet {t} has other particles in the solver");
+                return Err(Error::Inconsistent(what));
+            }
         }
-    }
-
-    /// The position of a particle in the world in m.
-    pub(crate) fn position(&self, particle: u32) -> DVec3 {
-        each!(self, solver => solver.position(particle as usize))
-    }
-
-    pub(crate) fn positions(&self, out: &mut Vec<DVec3>) {
-        each!(self, solver => solver.positions(out));
+        let mut star = Vec::new();
+        for p in 0..mesh.positions.len() {
+            let fresh = mass(solver, cuttable, ParticleId::new(p), &mut star);
+            let stored = solver.mass(p);
+            if (stored - fresh).abs() > 1e-12 * fresh {
+                let what = format!("particle {p} has mass {stored} instead of {fresh}");
+                return Err(Error::Inconsistent(what));
+            }
+        }
+        let layout = solver.check_layout(schedule);
+        layout.map_err(|error| Error::Inconsistent(error.to_string()))?;
+        self.backend().check(schedule)
     }
 }
 
 impl<R: Real> Backend<R> {
-    fn new(positions: &[DVec3]) -> Self {
-        Self {
-            solver: Solver::new(positions),
-            vbd: None,
-        }
+    fn new(solver: Solver<R>) -> Self {
+        Self { solver, vbd: None }
+    }
+}
+
+impl<R: Real> SolverBackend for Backend<R> {
+    fn host(&self) -> &dyn ErasedSolver {
+        &self.solver
     }
 
-    fn check_vbd(&self) -> Result<(), Error> {
-        let checked = self.vbd.as_ref().map(|vbd| vbd.check(&self.solver));
-        checked
-            .unwrap_or(Ok(()))
-            .map_err(|error| Error::Inconsistent(error.to_string()))
+    fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
+        Ok(&mut self.solver)
     }
 
     fn prepare(&mut self, spec: &SolverSpec) -> Result<(), Error> {
@@ -369,39 +284,20 @@ impl<R: Real> Backend<R> {
         }
         Ok(())
     }
-}
 
-impl<R: Real> SolverBackend for Backend<R> {
     fn step(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-        keep: bool,
-    ) -> Result<StepReport, Error> {
-        let Self { solver, vbd } = self;
-        let step = match vbd {
-            Some(vbd) => vbd.step(solver, settings, keep),
-            None if keep => solver.step_keeping_residuals(schedule, settings),
-            None => solver.step(schedule, settings),
-        };
-        step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })
-    }
-
-    fn step_part(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
         part: Range<u32>,
         keep: bool,
     ) -> Result<StepReport, Error> {
-        let step = self.solver.step_part(schedule, settings, part, keep);
-        step.map_err(|source| Error::Xpbd {
-            field: "solver".into(),
-            source,
-        })
+        let Self { solver, vbd } = self;
+        let step = match vbd {
+            Some(vbd) => vbd.step(solver, settings, keep),
+            None => solver.step_part(schedule, settings, part, keep),
+        };
+        step.map_err(Error::xpbd("solver"))
     }
 
     fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {
@@ -433,19 +329,12 @@ impl<R: Real> SolverBackend for Backend<R> {
                 force: vbd.last.force?,
                 potential: vbd.last.potential?,
             }),
-            None => self
-                .solver
-                .residuals(substep_time)
-                .map(LastSubstep::Constraints),
+            None => (self.solver.residuals(substep_time)).map(LastSubstep::Constraints),
         }
     }
 
     fn measure_forces(&mut self, measuring: bool) {
         self.solver.measure_forces(measuring);
-    }
-
-    fn forces(&self) -> Option<Forces> {
-        self.solver.forces()
     }
 
     fn move_handle(&mut self, handle: u32, pose: Pose) {
@@ -454,10 +343,6 @@ impl<R: Real> SolverBackend for Backend<R> {
 
     fn bytes(&self) -> usize {
         self.solver.bytes() + self.vbd.as_ref().map_or(0, Vbd::bytes)
-    }
-
-    fn host_max_speed(&self) -> Option<f64> {
-        Some(self.solver.max_speed())
     }
 
     fn update_vbd(&mut self, changed: Option<&[u32]>, ms: &mut Milliseconds) -> Result<(), Error> {
@@ -474,23 +359,22 @@ impl<R: Real> SolverBackend for Backend<R> {
         self.vbd = None;
     }
 
-    fn read_back(&mut self) -> Result<usize, Error> {
-        Ok(0)
-    }
-
-    fn take_repaired(&mut self) -> usize {
-        0
+    fn check(&self, _: &Schedule) -> Result<(), Error> {
+        let checked = self.vbd.as_ref().map(|vbd| vbd.check(&self.solver));
+        checked
+            .unwrap_or(Ok(()))
+            .map_err(|error| Error::Inconsistent(error.to_string()))
     }
 }
 
 /// Whether a tet is too stiff for a limit.
-fn exceeds<R: Real>(solver: &Solver<R>, tet: usize, limit: Option<KappaLimit>) -> bool {
+fn exceeds(solver: &dyn ErasedSolver, tet: usize, limit: Option<KappaLimit>) -> bool {
     limit.is_some_and(|limit| solver.kappa_of(tet, limit.substep_time) > limit.kappa)
 }
 
 /// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.
-pub(crate) fn mass<R: Real>(
-    solver: &Solver<R>,
+pub(crate) fn mass(
+    solver: &dyn ErasedSolver,
     cuttable: &CuttableMesh,
     particle: ParticleId,
     star: &mut Vec<TetId>,
@@ -557,7 +441,7 @@ struct Momentum {
 }
 
 impl Momentum {
-    fn of<R: Real>(solver: &Solver<R>, particles: &[ParticleId]) -> Self {
+    fn of(solver: &dyn ErasedSolver, particles: &[ParticleId]) -> Self {
         let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
         for p in particles.iter().map(|p| p.index()) {
             let momentum = solver.mass(p) * solver.velocity(p);
@@ -569,7 +453,7 @@ impl Momentum {
 
     /// Gives particles that have other masses now this momentum again, with the rigid motion that makes up for the
     /// difference. A region where the solver holds a particle still keeps its velocities.
-    fn restore<R: Real>(self, solver: &mut Solver<R>, particles: &[ParticleId]) {
+    fn restore(self, solver: &mut dyn ErasedSolver, particles: &[ParticleId]) {
         let with_mass = particles.iter().map(|p| p.index());
         let with_mass: Vec<usize> = with_mass.filter(|&p| solver.mass(p) > 0.0).collect();
         if with_mass.iter().any(|&p| !solver.is_free(p)) {
@@ -625,34 +509,33 @@ mod tests {
             let mut cuttable = CuttableMesh::new(mesh.clone()).unwrap();
             let mut any = AnySolver::of_particles(Precision::F64, &mesh.positions);
             let mut star = Vec::new();
-            each_mut!(&mut any, solver => {
-                let material = Material {
-                    young_modulus: 1e5,
-                    poisson_ratio: 0.4,
-                    density: 1100.0,
-                    damping: 0.0,
-                };
-                solver.add_material(material).unwrap();
-                for (t, tet) in mesh.tets.iter().enumerate() {
-                    solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), 0);
-                }
-                for (p, x) in mesh.positions.iter().enumerate() {
-                    let (sin, cos) = (0.4 * x.z).sin_cos();
-                    let twisted = DVec3::new(cos * x.x - sin * x.y, sin * x.x + cos * x.y, x.z);
-                    solver.set_position(p, twisted);
-                    solver.set_velocity(p, DVec3::new(x.y * x.z, 1.0 - x.x, (7.0 * x.x).sin()));
-                    let mass = mass(solver, &cuttable, ParticleId::new(p), &mut star);
-                    solver.set_mass(p, mass);
-                }
-            });
+            let solver = any.edit()?;
+            let material = Material {
+                young_modulus: 1e5,
+                poisson_ratio: 0.4,
+                density: 1100.0,
+                damping: 0.0,
+            };
+            solver.add_material(material).unwrap();
+            for (t, tet) in mesh.tets.iter().enumerate() {
+                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), 0);
+            }
+            for (p, x) in mesh.positions.iter().enumerate() {
+                let (sin, cos) = (0.4 * x.z).sin_cos();
+                let twisted = DVec3::new(cos * x.x - sin * x.y, sin * x.x + cos * x.y, x.z);
+                solver.set_position(p, twisted);
+                solver.set_velocity(p, DVec3::new(x.y * x.z, 1.0 - x.x, (7.0 * x.x).sin()));
+                let mass = mass(solver, &cuttable, ParticleId::new(p), &mut star);
+                solver.set_mass(p, mass);
+            }
             let all = |any: &AnySolver| {
-                each!(any, solver => {
-                    let all: Vec<ParticleId> = (0..solver.particle_count()).map(ParticleId::new).collect();
-                    let mass: f64 = all.iter().map(|p| solver.mass(p.index())).sum();
-                    let mut positions = Vec::new();
-                    solver.positions(&mut positions);
-                    (mass, Momentum::of(solver, &all), positions)
-                })
+                let solver = any.host();
+                let all = (0..solver.particle_count()).map(ParticleId::new);
+                let all: Vec<ParticleId> = all.collect();
+                let mass: f64 = all.iter().map(|p| solver.mass(p.index())).sum();
+                let mut positions = Vec::new();
+                solver.positions(&mut positions);
+                (mass, Momentum::of(solver, &all), positions)
             };
             let mut near = Vec::new();
             for (i, normal) in [DVec3::X, DVec3::new(1.0, 0.3, 0.1)]

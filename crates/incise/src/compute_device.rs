@@ -4,29 +4,17 @@
 //! settings, and otherwise the CPU, with the reason. A software device is slower than the CPU path, so only `gpu` takes
 //! it. Cost: opening a device takes some hundred milliseconds, once.
 
-#[cfg(feature = "gpu")]
-use std::sync::Arc;
-
-#[cfg(feature = "gpu")]
-use incise_gpu::{GpuContext, GpuOptions};
-
+use crate::device::{OpenDevice, open};
 use crate::method::check_forces;
 use crate::scene::{Backend, Method, Precision, StrokeSpec};
 use crate::validate::value;
 use crate::{Error, Scene, solid_blade};
 
-/// A device that is open, if one is.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct OpenDevice {
-    #[cfg(feature = "gpu")]
-    pub(crate) gpu: Option<Arc<GpuContext>>,
-}
-
 /// The CPU or the GPU that computes a scene.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ComputeDevice {
-    #[cfg(feature = "gpu")]
-    pub(crate) gpu: Option<Arc<GpuContext>>,
+    /// The GPU; `None` is the CPU.
+    pub(crate) gpu: OpenDevice,
     /// Explanation of the choice, for the user.
     pub(crate) note: Option<String>,
 }
@@ -44,61 +32,20 @@ impl ComputeDevice {
                 _ => Err(refused),
             };
         }
-        Self::open(backend, open_device)
+        Ok(match open(backend, open_device)? {
+            (None, reason) => Self::cpu(&reason),
+            (gpu, name) => Self {
+                gpu,
+                note: Some(format!("computed on {name}")),
+            },
+        })
     }
 
-    /// The device that it is, or else the other one.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn or(&self, other: &OpenDevice) -> OpenDevice {
-        OpenDevice {
-            gpu: self.gpu.clone().or_else(|| other.gpu.clone()),
-        }
-    }
-
-    /// There is none.
-    #[cfg(not(feature = "gpu"))]
-    pub(crate) fn or(&self, other: &OpenDevice) -> OpenDevice {
-        other.clone()
-    }
-
+    /// The CPU, and why.
     fn cpu(reason: &str) -> Self {
         Self {
-            #[cfg(feature = "gpu")]
             gpu: None,
             note: Some(format!("computed on the processor: {reason}")),
-        }
-    }
-
-    #[cfg(not(feature = "gpu"))]
-    fn open(backend: Backend, _: &OpenDevice) -> Result<Self, Error> {
-        match backend {
-            Backend::Gpu => Err(Error::NoGpuPath),
-            _ => Ok(Self::cpu("this build has no GPU path (feature `gpu`)")),
-        }
-    }
-
-    #[cfg(feature = "gpu")]
-    fn open(backend: Backend, open_device: &OpenDevice) -> Result<Self, Error> {
-        let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
-        match open_device.gpu.clone().map_or_else(open, Ok) {
-            Ok(gpu) if backend == Backend::Auto && gpu.adapter().software => {
-                let name = &gpu.adapter().name;
-                Ok(Self::cpu(&format!("the only GPU is software ({name})")))
-            }
-            Ok(gpu) => Ok(Self::on(gpu)),
-            Err(error) if backend == Backend::Auto => Ok(Self::cpu(&error.to_string())),
-            Err(error) => Err(error.into()),
-        }
-    }
-
-    /// On a device that is open.
-    #[cfg(feature = "gpu")]
-    pub(crate) fn on(gpu: Arc<GpuContext>) -> Self {
-        let adapter = gpu.adapter();
-        let note = format!("computed on {} ({})", adapter.name, adapter.backend);
-        Self {
-            note: Some(note),
-            gpu: Some(gpu),
         }
     }
 
@@ -109,10 +56,7 @@ impl ComputeDevice {
 
     /// Whether the state is elsewhere.
     pub(crate) fn is_gpu(&self) -> bool {
-        #[cfg(feature = "gpu")]
-        return self.gpu.is_some();
-        #[cfg(not(feature = "gpu"))]
-        return false;
+        self.gpu.is_some()
     }
 }
 

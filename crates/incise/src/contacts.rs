@@ -21,7 +21,7 @@ use incise_mesh::{ParticleId, closest_on_triangle};
 use incise_xpbd::{ContactLaw, EdgeContact, FaceContact, FaceLimit, PairContact, SurfaceContact};
 use web_time::Instant;
 
-use crate::backend::{AnySolver, each, each_mut};
+use crate::backend::AnySolver;
 use crate::report::{ContactCounts, milliseconds};
 use crate::scene::{ContactPairs, ContactSpec};
 use crate::validate::{existing, value, within};
@@ -314,14 +314,13 @@ impl Contacts {
             fixed,
             ..
         } = &mut self.room;
-        each!(solver, solver => {
-            let particles = 0..solver.particle_count();
-            solver.positions(positions);
-            velocities.clear();
-            velocities.extend(particles.clone().map(|p| solver.velocity(p)));
-            fixed.clear();
-            fixed.extend(particles.map(|p| !solver.is_free(p)));
-        });
+        let solver = solver.host();
+        let particles = 0..solver.particle_count();
+        solver.positions(positions);
+        velocities.clear();
+        velocities.extend(particles.clone().map(|p| solver.velocity(p)));
+        fixed.clear();
+        fixed.extend(particles.map(|p| !solver.is_free(p)));
     }
 
     /// Finds what may touch in the next `time` s, and hands it to the solver.
@@ -363,12 +362,10 @@ impl Contacts {
             particles: contact.particles,
             normal: contact.normal,
         }));
-        each_mut!(solver, solver => {
-            let pairs = (&room.pairs[..], &self.pair_colors);
-            let surfaces = (&self.surfaces[..], &self.surface_colors);
-            let set = solver.set_contacts(&self.law, pairs, surfaces);
-            set.map_err(|source| Error::Xpbd { field: "contact".into(), source })?;
-        });
+        let pairs = (&room.pairs[..], &self.pair_colors);
+        let surfaces = (&self.surfaces[..], &self.surface_colors);
+        let set = solver.edit()?.set_contacts(&self.law, pairs, surfaces);
+        set.map_err(Error::xpbd("contact"))?;
         self.milliseconds += milliseconds(start.elapsed());
         Ok(())
     }
@@ -428,25 +425,31 @@ impl Contacts {
             ..
         } = &mut self.room;
         *deepest = (0.0, [0; 2]);
-        each!(solver, solver => {
-            for contact in solver.contacts() {
-                if contact.depth > deepest.0 {
-                    *deepest = (contact.depth, [contact.against, contact.vertex]);
-                }
-                let presses = contact.pressure > 0.0;
-                if !presses && contact.depth < -near {
-                    continue;
-                }
-                let of = [contact.against, contact.vertex].map(piece_of);
-                let [Some(against), Some(vertex)] = of else { continue };
-                let key = [against.min(vertex), against.max(vertex)];
-                // A piece that touches itself is not an event, and its forces add up to nothing.
-                if against == vertex || !(presses || touched(&key)) {
-                    continue;
-                }
-                let force = if vertex > against { contact.force } else { -contact.force };
-                out.push(Touch { pieces: key, force, torque: contact.point.cross(force) });
+        solver.host().for_each_contact(&mut |contact| {
+            if contact.depth > deepest.0 {
+                *deepest = (contact.depth, [contact.against, contact.vertex]);
             }
+            let presses = contact.pressure > 0.0;
+            if !presses && contact.depth < -near {
+                return;
+            }
+            let of = [contact.against, contact.vertex].map(piece_of);
+            let [Some(against), Some(vertex)] = of else {
+                return;
+            };
+            let pieces = [against.min(vertex), against.max(vertex)];
+            // A piece that touches itself is not an event, and its forces add up to nothing.
+            if against == vertex || !(presses || touched(&pieces)) {
+                return;
+            }
+            let sign = if vertex > against { 1.0 } else { -1.0 };
+            let force = sign * contact.force;
+            let torque = contact.point.cross(force);
+            out.push(Touch {
+                pieces,
+                force,
+                torque,
+            });
         });
     }
 
@@ -518,10 +521,9 @@ impl Contacts {
         (self.pair_colors, self.surface_colors) = (Coloring::default(), Coloring::default());
         self.surfaces.clear();
         let none = Coloring::default();
-        each_mut!(solver, solver => {
-            let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
-            set.map_err(|source| Error::Xpbd { field: "contact".into(), source })
-        })
+        let solver = solver.edit()?;
+        let set = solver.set_contacts(&self.law, (&[], &none), (&[], &none));
+        set.map_err(Error::xpbd("contact"))
     }
 
     /// Pieces that touched in the last frame, ascending.
@@ -546,15 +548,14 @@ impl Contacts {
             buried: self.detector.buried(),
             ..ContactCounts::default()
         };
-        each!(solver, solver => {
-            counts.colors = solver.contact_color_count();
-            counts.candidates = solver.contact_counts().iter().sum();
-            for contact in solver.contacts() {
-                let presses = contact.pressure > 0.0;
-                counts.active += usize::from(presses);
-                if presses || contact.depth > 0.0 {
-                    depths.push(contact.depth.max(0.0) / edge);
-                }
+        let solver = solver.host();
+        counts.colors = solver.contact_color_count();
+        counts.candidates = solver.contact_counts().iter().sum();
+        solver.for_each_contact(&mut |contact| {
+            let presses = contact.pressure > 0.0;
+            counts.active += usize::from(presses);
+            if presses || contact.depth > 0.0 {
+                depths.push(contact.depth.max(0.0) / edge);
             }
         });
         counts

@@ -8,15 +8,40 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use incise_clustering::Method;
-use incise_gpu::{ClusterMapping, GpuContext, GpuSolver};
+pub(crate) use incise_gpu::GpuContext;
+use incise_gpu::{ClusterMapping, GpuOptions, GpuSolver};
 use incise_graph::Schedule;
-use incise_xpbd::{Forces, Pose, Solver, StepReport, StepSettings};
+use incise_xpbd::{ErasedSolver, Pose, Solver, StepReport, StepSettings};
 use web_time::Instant;
 
 use crate::Error;
 use crate::report::{Milliseconds, milliseconds};
-use crate::scene::{Quantity, SolverSpec};
-use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
+use crate::scene::{Backend, Quantity, SolverSpec};
+use crate::solver_backend::{Measures, SolverBackend};
+
+/// A device that is open, if one is.
+pub(crate) type OpenDevice = Option<Arc<GpuContext>>;
+
+/// Takes the open device or opens one, with its name; with `auto` none, and why, if there is no hardware device.
+pub(crate) fn open(
+    backend: Backend,
+    open_device: &OpenDevice,
+) -> Result<(OpenDevice, String), Error> {
+    let open = || GpuContext::new(&GpuOptions::from_env()).map(Arc::new);
+    match open_device.clone().map_or_else(open, Ok) {
+        Ok(gpu) => {
+            let adapter = gpu.adapter();
+            if backend == Backend::Auto && adapter.software {
+                let reason = format!("the only GPU is software ({})", adapter.name);
+                return Ok((None, reason));
+            }
+            let name = format!("{} ({})", adapter.name, adapter.backend);
+            Ok((Some(gpu), name))
+        }
+        Err(error) if backend == Backend::Auto => Ok((None, error.to_string())),
+        Err(error) => Err(error.into()),
+    }
+}
 
 /// A solver on a GPU.
 #[derive(Debug)]
@@ -42,24 +67,36 @@ impl Device {
     pub(crate) fn serves(&self, gpu: &Arc<GpuContext>, spec: &SolverSpec) -> Result<bool, Error> {
         Ok(Arc::ptr_eq(self.solver.gpu(), gpu) && self.solver.cluster_mapping() == mapping(spec)?)
     }
+
+    /// The host's solver with the state of the last readback.
+    pub(crate) fn cached_host(&self) -> &Solver<f32> {
+        self.solver.cached_host()
+    }
+
+    /// Takes another solver to the device, in the memory of the present one.
+    pub(crate) fn replace(&mut self, host: Solver<f32>) {
+        self.solver.replace(host);
+    }
+
+    pub(crate) fn backend(&self) -> &dyn SolverBackend {
+        self
+    }
+
+    pub(crate) fn backend_mut(&mut self) -> &mut dyn SolverBackend {
+        self
+    }
 }
 
 impl SolverBackend for Device {
-    fn step(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-        keep: bool,
-    ) -> Result<StepReport, Error> {
-        if keep {
-            self.solver.step_keeping_residuals(schedule, settings)?;
-        } else {
-            self.solver.step(schedule, settings)?;
-        }
-        Ok(StepReport::default())
+    fn host(&self) -> &dyn ErasedSolver {
+        self.solver.cached_host()
     }
 
-    fn step_part(
+    fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error> {
+        Ok(self.solver.edit()?)
+    }
+
+    fn step(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
@@ -67,10 +104,7 @@ impl SolverBackend for Device {
         keep: bool,
     ) -> Result<StepReport, Error> {
         self.solver.step_part(schedule, settings, part, keep)?;
-        Ok(StepReport {
-            repaired: self.read_back()?,
-            ..StepReport::default()
-        })
+        Ok(StepReport::default())
     }
 
     fn lay_out(&mut self, schedule: &Schedule, ms: &mut Milliseconds) -> Result<(), Error> {
@@ -90,38 +124,9 @@ impl SolverBackend for Device {
         })
     }
 
-    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
-        let residuals = self.solver.cached_host().residuals(substep_time);
-        residuals.map(LastSubstep::Constraints)
-    }
-
-    fn measure_forces(&mut self, _measuring: bool) {}
-
-    fn forces(&self) -> Option<Forces> {
-        None
-    }
-
     fn move_handle(&mut self, handle: u32, pose: Pose) {
         self.solver.move_handle(handle, pose);
     }
-
-    fn bytes(&self) -> usize {
-        self.solver.cached_host().bytes()
-    }
-
-    fn host_max_speed(&self) -> Option<f64> {
-        None
-    }
-
-    fn update_vbd(&mut self, _: Option<&[u32]>, _: &mut Milliseconds) -> Result<(), Error> {
-        Ok(())
-    }
-
-    fn vbd_error(&self) -> Option<f64> {
-        None
-    }
-
-    fn end_vbd(&mut self) {}
 
     fn read_back(&mut self) -> Result<usize, Error> {
         self.solver.host()?;
@@ -133,6 +138,10 @@ impl SolverBackend for Device {
         let fresh = repaired.wrapping_sub(self.reported) as usize;
         self.reported = repaired;
         fresh
+    }
+
+    fn check(&self, schedule: &Schedule) -> Result<(), Error> {
+        Ok(self.solver.check(schedule)?)
     }
 }
 

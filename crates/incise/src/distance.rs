@@ -8,7 +8,7 @@ use incise_graph::{Clustering, Incidence, Schedule};
 use incise_mesh::ParticleId;
 use incise_xpbd::DistanceConstraint;
 
-use crate::backend::{AnySolver, each_mut};
+use crate::backend::AnySolver;
 use crate::scene::{DistanceSpec, EndSpec};
 use crate::validate::{LARGEST_COORDINATE, coordinates, existing, value, within};
 use crate::{Error, Scene};
@@ -103,8 +103,12 @@ pub(crate) struct Distances {
 impl Distances {
     /// Whether a constraint ends at a particle. Linear in the constraints.
     pub(crate) fn holds(&self, particle: ParticleId) -> bool {
-        let mut ends = self.list.iter().flat_map(|constraint| constraint.particles);
-        ends.any(|end| end == particle.0)
+        self.ends().flatten().any(|end| end == particle.0)
+    }
+
+    /// The particles of each constraint.
+    pub(crate) fn ends(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        self.list.iter().map(|constraint| constraint.particles)
     }
 
     pub(crate) fn is_empty(&self) -> bool {
@@ -145,13 +149,11 @@ impl Distances {
 
     /// Hands all to the solver, in an order by colors.
     pub(crate) fn hand_to(&self, solver: &mut AnySolver) -> Result<(), Error> {
-        each_mut!(solver, solver => {
-            let particles = self.list.iter().map(|constraint| constraint.particles);
-            let incidence = Incidence::from_constraints(solver.particle_count(), particles)?;
-            let coloring = greedy(&incidence, Order::LargestFirst);
-            let schedule = Schedule::new(&Clustering::none(self.list.len()), &coloring);
-            let set = solver.set_distances(&self.list, schedule);
-            set.map_err(|source| Error::Xpbd { field: "distance".into(), source })
-        })
+        let solver = solver.edit()?;
+        let incidence = Incidence::from_constraints(solver.particle_count(), self.ends())?;
+        let coloring = greedy(&incidence, Order::LargestFirst);
+        let schedule = Schedule::new(&Clustering::none(self.list.len()), &coloring);
+        let set = solver.set_distances(&self.list, schedule);
+        set.map_err(Error::xpbd("distance"))
     }
 }

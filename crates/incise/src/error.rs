@@ -164,6 +164,24 @@ pub fn clustering_suggestion(error: &ClusteringError) -> String {
     }
 }
 
+impl Error {
+    /// Wraps an error of a solver about a part of the scene.
+    pub(crate) fn xpbd(field: &str) -> impl FnOnce(XpbdError) -> Self {
+        move |source| Self::Xpbd {
+            field: field.to_owned(),
+            source,
+        }
+    }
+
+    /// Wraps an error of a cut by a part of the scene.
+    pub(crate) fn cut(field: &str) -> impl FnOnce(CutError) -> Self {
+        move |source| Self::Cut {
+            field: field.to_owned(),
+            source,
+        }
+    }
+}
+
 impl From<GraphError> for Error {
     fn from(error: GraphError) -> Self {
         Self::Inconsistent(error.to_string())

@@ -35,13 +35,13 @@ impl Measured {
         body_of_tet: impl Fn(TetId) -> usize,
         strokes: impl Iterator<Item = u32>,
     ) -> Option<Box<Self>> {
-        let forces = solver.backend().forces()?;
+        let forces = solver.host().forces()?;
         let mut fixed = BTreeMap::new();
         for (p, force) in forces.fixed {
             let mut around = mesh.around(ParticleId(p));
             // What has lost all its tets belongs to no body.
             let Some(tet) = around.next() else { continue };
-            let x = solver.position(p);
+            let x = solver.host().position(p as usize);
             let none = (incise_xpbd::Force::default(), DVec3::ZERO, 0.0);
             let (sum, center, count) = fixed.entry(body_of_tet(tet)).or_insert(none);
             sum.force += force;

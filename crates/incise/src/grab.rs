@@ -11,8 +11,7 @@ use glam::DVec3;
 use incise_xpbd::Pose;
 
 use crate::Error;
-use crate::attachment::detach_all;
-use crate::backend::{AnySolver, each, each_mut};
+use crate::backend::AnySolver;
 
 /// Handle of an interactive grab in the simulation that returned it: see [`Simulation::grab`](crate::Simulation::grab).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -96,7 +95,10 @@ impl Grabs {
         let Some(active) = self.find(grab) else {
             return Ok(false);
         };
-        detach(solver, active.handle)?;
+        solver.edit()?.detach_all(active.handle);
+        // Handles go back to where they began, so that their ways do not add up from grab to grab.
+        let start = Pose::at(DVec3::ZERO);
+        solver.backend_mut().move_handle(active.handle, start);
         active.held = false;
         Ok(true)
     }
@@ -117,32 +119,30 @@ impl Grabs {
     ) -> Result<(), Error> {
         let vacant = self.active.iter().position(|grab| !grab.held);
         let slot = vacant.unwrap_or(self.active.len());
-        each_mut!(solver, solver => {
-            let known = self.active.get(slot).map(|grab| grab.handle);
-            let handle = known.unwrap_or_else(|| solver.add_handle(Pose::at(DVec3::ZERO)));
-            let pose = solver.handle(handle);
-            // The handle may still be moving back.
-            solver.move_handle(handle, pose);
-            for &p in particles {
-                solver
-                    .attach(p, handle, compliance, 0.0)
-                    .map_err(|source| Error::Xpbd { field: "grab".into(), source })?;
-            }
-            let grab = ActiveGrab {
-                handle,
-                grab: grab.0,
-                held: true,
-                point,
-                to: point,
-                start: pose.position,
-                moved: false,
-            };
-            match self.active.get_mut(slot) {
-                Some(old) => *old = grab,
-                None => self.active.push(grab),
-            }
-            Ok(())
-        })
+        let solver = solver.edit()?;
+        let known = self.active.get(slot).map(|grab| grab.handle);
+        let handle = known.unwrap_or_else(|| solver.add_handle(Pose::at(DVec3::ZERO)));
+        let pose = solver.handle(handle);
+        // The handle may still be moving back.
+        solver.move_handle(handle, pose);
+        for &p in particles {
+            let attached = solver.attach(p, handle, compliance, 0.0);
+            attached.map_err(Error::xpbd("grab"))?;
+        }
+        let grab = ActiveGrab {
+            handle,
+            grab: grab.0,
+            held: true,
+            point,
+            to: point,
+            start: pose.position,
+            moved: false,
+        };
+        match self.active.get_mut(slot) {
+            Some(old) => *old = grab,
+            None => self.active.push(grab),
+        }
+        Ok(())
     }
 
     /// Returns an error if a particle is attached to a released handle.
@@ -151,23 +151,12 @@ impl Grabs {
             let mut active = self.active.iter();
             active.any(|grab| grab.handle == handle && !grab.held)
         };
-        let attached = each!(solver, solver => {
-            solver.attachments().find(|attachment| free(attachment.handle))
-        });
-        attached.map_or(Ok(()), |attachment| {
-            let p = attachment.particle;
+        let solver = solver.host();
+        let is_left = |p: &usize| solver.handle_of(*p).is_some_and(free);
+        let left = (0..solver.particle_count()).find(is_left);
+        left.map_or(Ok(()), |p| {
             let what = format!("particle {p} is attached to a released handle");
             Err(Error::Inconsistent(what))
         })
     }
-}
-
-/// Detaches all particles from a handle and sends it back to where it began, so that its way does not add up from grab
-/// to grab.
-fn detach(solver: &mut AnySolver, handle: u32) -> Result<(), Error> {
-    detach_all(solver, handle)?;
-    solver
-        .backend_mut()
-        .move_handle(handle, Pose::at(DVec3::ZERO));
-    Ok(())
 }

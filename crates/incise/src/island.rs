@@ -20,7 +20,7 @@ use web_time::Instant;
 pub(crate) use self::judged::Budget;
 use self::judged::{Judged, accuracy_data};
 use crate::attachment::{Attachment, AttachmentHandle};
-use crate::backend::{AnySolver, each, each_mut};
+use crate::backend::AnySolver;
 use crate::compute_device::ComputeDevice;
 use crate::contacts::Contacts;
 use crate::distance::Distances;
@@ -167,10 +167,7 @@ impl Island {
         mut joined: IslandBuilder,
     ) -> Result<Self, Error> {
         let mesh = std::mem::take(&mut joined.mesh);
-        let mut cuttable = CuttableMesh::new(mesh).map_err(|source| Error::Cut {
-            field: "body".into(),
-            source,
-        })?;
+        let mut cuttable = CuttableMesh::new(mesh).map_err(Error::cut("body"))?;
         // In a scene with contact improvement leaves the boundary alone.
         cuttable.record_opened_faces(scene.cutting.improve && scene.contact.is_none());
         let mut solver = joined.solver(precision, &cuttable)?;
@@ -234,7 +231,7 @@ impl Island {
             spec,
             sleep: scene.solver.sleep.map(SleepState::new),
         };
-        island.solver.positions(&mut island.positions);
+        island.solver.host().positions(&mut island.positions);
         island.judge_settings();
         let empty = joined.empty_regions.into_iter();
         island
@@ -295,13 +292,12 @@ impl Island {
             self.step_with_contact(keeping_residuals)
         } else {
             let (schedule, settings) = (&self.partition.schedule, &self.settings);
-            let backend = self.solver.backend_mut();
-            backend.step(schedule, settings, keeping_residuals)
+            let (backend, whole) = (self.solver.backend_mut(), 0..settings.substeps);
+            backend.step(schedule, settings, whole, keeping_residuals)
         };
         // Also after an error: no blade may stay behind.
         if !self.constraints.blades.is_empty() {
-            self.constraints.edge_work =
-                each!(&self.solver, solver => solver.blade_work().to_vec());
+            self.constraints.edge_work = self.solver.host().blade_work().to_vec();
             self.set_blades(Vec::new())?;
         }
         let step = step?;
@@ -321,11 +317,10 @@ impl Island {
             let state = self.solver.backend_mut().state(None, &[Quantity::Speed])?;
             let falls_asleep = |speed| rest.count(speed, time);
             if state.max_speed.is_some_and(falls_asleep) {
-                each_mut!(&mut self.solver, solver => {
-                    for p in 0..solver.particle_count() {
-                        solver.set_velocity(p, DVec3::ZERO);
-                    }
-                });
+                let solver = self.solver.edit()?;
+                for p in 0..solver.particle_count() {
+                    solver.set_velocity(p, DVec3::ZERO);
+                }
             }
         }
         Ok(step)
@@ -333,10 +328,8 @@ impl Island {
 
     /// Hands solid blades to the solver.
     fn set_blades(&mut self, blades: Vec<SolidBlade>) -> Result<(), Error> {
-        each_mut!(&mut self.solver, solver => {
-            let set = solver.set_blades(blades);
-            set.map_err(|source| Error::Xpbd { field: "stroke.solid".into(), source })
-        })
+        let set = self.solver.edit()?.set_blades(blades);
+        set.map_err(Error::xpbd("stroke.solid"))
     }
 
     /// A frame in parts, before each of which contacts are found.
@@ -366,8 +359,8 @@ impl Island {
             contacts.update(solver, cuttable, pieces, time / f64::from(parts))?;
             let (schedule, range) = (&partition.schedule, end(part)..end(part + 1));
             let backend = solver.backend_mut();
-            let step = backend.step_part(schedule, settings, range, keeping_residuals)?;
-            report.repaired += step.repaired;
+            let step = backend.step(schedule, settings, range, keeping_residuals)?;
+            report.repaired += step.repaired + backend.read_back()?;
             report.jittered += step.jittered;
             contacts.note(solver, cuttable, pieces);
         }
@@ -378,7 +371,7 @@ impl Island {
 
     /// The number of the body of a tet in the scene.
     pub(crate) fn body_of_tet(&self, tet: TetId) -> usize {
-        let material = each!(&self.solver, solver => solver.material_of(tet.index()));
+        let material = self.solver.host().material_of(tet.index());
         self.bodies[self.body_of[usize::from(material)]]
     }
 
@@ -398,10 +391,7 @@ impl Island {
     pub(crate) fn remove_tets_of(&mut self, body: usize) -> Result<CutDelta, Error> {
         let all = (0..self.cuttable.mesh().tets.len()).map(TetId::new);
         let tets: Vec<TetId> = all.filter(|&t| self.body_of_tet(t) == body).collect();
-        remove_tets(&mut self.cuttable, &tets, 0).map_err(|source| Error::Cut {
-            field: "body".into(),
-            source,
-        })
+        remove_tets(&mut self.cuttable, &tets, 0).map_err(Error::cut("body"))
     }
 
     /// For each material what its body, given by its number in the scene, asks for.
@@ -412,25 +402,23 @@ impl Island {
 
     /// Whether all tets have one density in kg/m³, and which.
     pub(crate) fn density(&self) -> Option<f64> {
-        each!(&self.solver, solver => {
-            let first = solver.materials().first()?.density;
-            let same = solver.materials().iter().all(|m| m.density == first);
-            same.then_some(first)
-        })
+        let materials = self.solver.host().materials();
+        let first = materials.first()?.density;
+        let same = materials.iter().all(|m| m.density == first);
+        same.then_some(first)
     }
 
     /// The mass at rest in kg of each of its pieces that is wanted, by number. O(tets).
     pub(crate) fn masses(&self, wanted: impl Fn(u32) -> bool) -> BTreeMap<u32, f64> {
-        let mesh = self.cuttable.mesh();
+        let (mesh, solver) = (self.cuttable.mesh(), self.solver.host());
         let mut masses = BTreeMap::new();
-        each!(&self.solver, solver => {
-            for t in (0..mesh.tets.len()).map(TetId::new) {
-                let piece = self.pieces.piece_of(t);
-                if wanted(piece) {
-                    *masses.entry(piece).or_insert(0.0) += solver.density_of(t.index()) * mesh.volume(t);
-                }
+        for t in (0..mesh.tets.len()).map(TetId::new) {
+            let piece = self.pieces.piece_of(t);
+            if wanted(piece) {
+                let mass = solver.density_of(t.index()) * mesh.volume(t);
+                *masses.entry(piece).or_insert(0.0) += mass;
             }
-        });
+        }
         masses
     }
 
@@ -541,10 +529,9 @@ impl Island {
         let near = distances
             .zip(0..)
             .filter(move |(d, _)| *d <= radius * radius);
+        let solver = self.solver.host();
         near.filter(|&(_, p)| {
-            let free = each!(&self.solver, solver => {
-                !solver.is_fixed(p) && solver.handle_of(p).is_none()
-            });
+            let free = !solver.is_fixed(p) && solver.handle_of(p).is_none();
             free && self.piece_of(p).is_some()
         })
     }
@@ -618,26 +605,23 @@ impl Island {
             max_tets: IMPROVED_TETS.max(cuttable.mesh().tets.len() / IMPROVED_PART),
             ..ImproveOptions::default()
         };
-        let improved = each!(solver, solver => {
-            let is_locked = |mesh: &CuttableMesh, particle: ParticleId| {
-                let mut around = mesh.around(particle);
-                let Some(first) = around.next() else {
-                    return true;
-                };
-                let material = solver.material_of(first.index());
-                let corners = mesh.around(particle).flat_map(|tet| mesh.mesh().tets[tet.index()]);
-                distances.holds(particle)
-                    || (registry.is_on_surface(particle) && mesh.is_inside(particle))
-                    || solver.handle_of(particle.index()).is_some()
-                    || around.any(|tet| solver.material_of(tet.index()) != material)
-                    || corners.into_iter().any(|p| !solver.is_free(p.index()))
+        let solver = solver.host();
+        let is_locked = |mesh: &CuttableMesh, particle: ParticleId| {
+            let mut around = mesh.around(particle);
+            let Some(first) = around.next() else {
+                return true;
             };
-            improve(cuttable, positions, near, &options, is_locked)
-        });
-        improved.map_err(|source| Error::Cut {
-            field: "cutting.improve".into(),
-            source,
-        })
+            let material = solver.material_of(first.index());
+            let tets = mesh.around(particle);
+            let mut corners = tets.flat_map(|tet| mesh.mesh().tets[tet.index()]);
+            distances.holds(particle)
+                || (registry.is_on_surface(particle) && mesh.is_inside(particle))
+                || solver.handle_of(particle.index()).is_some()
+                || around.any(|tet| solver.material_of(tet.index()) != material)
+                || corners.any(|p| !solver.is_free(p.index()))
+        };
+        let improved = improve(cuttable, positions, near, &options, is_locked);
+        improved.map_err(Error::cut("cutting.improve"))
     }
 
     /// Applies a delta to solver, pieces, clusters, colors, schedule and volume constraints, and wakes the island.
@@ -662,15 +646,14 @@ impl Island {
         }
         let settings = &self.settings;
         for tet in delta.removed.iter().chain(&delta.deleted) {
-            let data =
-                each!(&self.solver, solver => accuracy_data(solver, tet.tet.index(), settings));
+            let data = accuracy_data(self.solver.host(), tet.tet.index(), settings);
             self.judged.outside.remove(data);
         }
         self.solver.apply_delta(delta, &self.cuttable)?;
         let mut stiffest = 0.0_f64;
         for tet in &delta.added {
             let slot = delta.slot_after(tet.tet).index();
-            let data = each!(&self.solver, solver => accuracy_data(solver, slot, settings));
+            let data = accuracy_data(self.solver.host(), slot, settings);
             stiffest = stiffest.max(data.1);
             self.judged.outside.add(data);
         }
@@ -738,10 +721,7 @@ impl Island {
 
     /// Recomputes everything derived and compares.
     pub(crate) fn check(&self) -> Result<(), Error> {
-        self.cuttable.check().map_err(|source| Error::Cut {
-            field: "mesh".into(),
-            source,
-        })?;
+        self.cuttable.check().map_err(Error::cut("mesh"))?;
         let mesh = self.cuttable.mesh();
         let (initial, volume) = (self.initial_volume, mesh.total_volume());
         let farthest = |far: f64, x: &DVec3| far.max(x.abs().max_element());

@@ -11,7 +11,7 @@ use incise_xpbd::Material;
 
 use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
-use crate::backend::{AnySolver, each, each_mut, mass};
+use crate::backend::{AnySolver, mass};
 use crate::distance::{DistanceHandle, Distances};
 use crate::method::tet_solve;
 use crate::resolved_body::ResolvedBody;
@@ -147,22 +147,23 @@ impl IslandBuilder {
     ) -> Result<AnySolver, Error> {
         let mesh = cuttable.mesh();
         let mut any = AnySolver::of_particles(precision, &mesh.positions);
-        each_mut!(&mut any, solver => {
-            for material in &self.materials {
-                let field = "body".to_owned();
-                solver.add_material(*material).map_err(|source| Error::Xpbd { field, source })?;
+        let solver = any.edit()?;
+        for material in &self.materials {
+            let added = solver.add_material(*material);
+            added.map_err(Error::xpbd("body"))?;
+        }
+        for (t, tet) in mesh.tets.iter().enumerate() {
+            let rest = mesh.corners(TetId::new(t));
+            solver.push_tet(tet.map(|p| p.0), rest, self.material_of[t]);
+        }
+        let mut star = Vec::new();
+        for (p, &fixed) in self.fixed.iter().enumerate() {
+            let mass = mass(solver, cuttable, ParticleId::new(p), &mut star);
+            solver.set_mass(p, mass);
+            if fixed {
+                solver.set_fixed(p, true);
             }
-            for (t, tet) in mesh.tets.iter().enumerate() {
-                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), self.material_of[t]);
-            }
-            let mut star = Vec::new();
-            for (p, &fixed) in self.fixed.iter().enumerate() {
-                solver.set_mass(p, mass(solver, cuttable, ParticleId::new(p), &mut star));
-                if fixed {
-                    solver.set_fixed(p, true);
-                }
-            }
-        });
+        }
         Ok(any)
     }
 
@@ -210,19 +211,16 @@ pub(crate) fn demands(
     concerns: impl Fn(u16) -> bool,
 ) -> Vec<TetDemand> {
     let accuracy = spec.accuracy.unwrap_or(DEFAULT_ACCURACY);
-    let limits = each!(solver, solver => {
-        largest_kappas(accuracy, solver.materials(), tet_solve(spec.tet_solve))
-    });
-    each!(solver, solver => {
-        let concerned = |t: &usize| concerns(solver.material_of(*t));
-        let kappa = |t: usize| solver.kappa_of(t, spec.time_step);
-        let tets = (0..mesh.tets.len()).filter(concerned);
-        tets.map(|t| TetDemand {
-            kappa: kappa(t),
-            largest_kappa: limits[usize::from(solver.material_of(t))],
-            poisson_ratio: solver.material(solver.material_of(t)).poisson_ratio,
+    let solver = solver.host();
+    let materials = solver.materials();
+    let limits = largest_kappas(accuracy, materials, tet_solve(spec.tet_solve));
+    let all = (0..mesh.tets.len()).map(|t| (t, solver.material_of(t)));
+    all.filter(|&(_, material)| concerns(material))
+        .map(|(t, material)| TetDemand {
+            kappa: solver.kappa_of(t, spec.time_step),
+            largest_kappa: limits[usize::from(material)],
+            poisson_ratio: materials[usize::from(material)].poisson_ratio,
             volume: mesh.volume(TetId::new(t)),
         })
         .collect()
-    })
 }

@@ -30,7 +30,7 @@ mod budget;
 mod collider;
 mod compute_device;
 mod contacts;
-#[cfg(feature = "gpu")]
+#[cfg_attr(not(feature = "gpu"), path = "no_device.rs")]
 mod device;
 mod distance;
 mod edge_points;

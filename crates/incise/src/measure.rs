@@ -7,7 +7,6 @@ use glam::DVec3;
 use incise_xpbd::Volume;
 
 use crate::Error;
-use crate::backend::each;
 use crate::island::Island;
 use crate::report::{
     BodyReport, ChosenMethod, ContactReport, EnergyReport, ResidualReport, SoftenedReport,
@@ -62,7 +61,7 @@ pub(crate) fn residual(islands: &[Island], gravity: Option<DVec3>) -> Option<Res
     for island in awake() {
         let time = island.settings.substep_time();
         if let Some(gravity) = gravity {
-            let load = each!(&island.solver, solver => solver.load(gravity));
+            let load = island.solver.host().load(gravity);
             weight = weight.hypot(load);
             moved = moved.hypot(load * time * time);
         }
@@ -107,7 +106,7 @@ pub(crate) fn residuals_of_tets(island: &Island) -> Option<Vec<f64>> {
         return None;
     }
     let time = island.settings.substep_time();
-    island.solver.residuals_of_tets(time)
+    island.solver.host().residuals_of_tets(time)
 }
 
 pub(crate) fn energy(states: &[Measures]) -> EnergyReport {
@@ -173,7 +172,7 @@ pub(crate) fn softened(islands: &[Island]) -> SoftenedReport {
 }
 
 fn softened_of(island: &Island) -> SoftenedReport {
-    each!(&island.solver, solver => solver.softened()).into()
+    island.solver.host().softened().into()
 }
 
 /// Substeps and what cuts did to kappa by island; `with_kappa` also those that take a pass over the tets.

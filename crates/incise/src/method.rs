@@ -72,10 +72,7 @@ pub(crate) fn settings(scene: &Scene) -> Result<StepSettings, Error> {
         _ if solver.two_level => Err(refused("solver.two_level", true, "false unless")),
         _ => Ok(settings.check()),
     };
-    checked?.map_err(|source| Error::Xpbd {
-        field: "solver".into(),
-        source,
-    })?;
+    checked?.map_err(Error::xpbd("solver"))?;
     check_forces(&scene.report, solver.method, false)?;
     if let Some(stroke) = scene.stroke.iter().position(StrokeSpec::is_solid) {
         solid_blade::check(&format!("stroke[{stroke}]"), solver.method, false)?;

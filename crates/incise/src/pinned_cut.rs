@@ -17,7 +17,6 @@ use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 use incise_mesh::{Bounds, ParticleId};
 
-use crate::backend::each;
 use crate::island::Island;
 use crate::warning::{Warning, WarningCode, box_text};
 
@@ -172,18 +171,17 @@ fn rim(island: &Island, faces: &[BoundaryTriangle], along: &[ParticleId]) -> Opt
 
 /// Whether a particle is fixed or rigidly attached, and not by a grab.
 fn is_pinned(island: &Island, p: ParticleId) -> bool {
-    let is_free = each!(&island.solver, solver => solver.is_free(p.index()));
-    !is_free && pinned_by(island, p).is_some()
+    !island.solver.host().is_free(p.index()) && pinned_by(island, p).is_some()
 }
 
 /// The key of the scene that pins a particle.
 fn pinned_by(island: &Island, p: ParticleId) -> Option<String> {
-    let (is_fixed, handle) =
-        each!(&island.solver, solver => (solver.is_fixed(p.index()), solver.handle_of(p.index())));
-    if is_fixed {
+    let solver = island.solver.host();
+    if solver.is_fixed(p.index()) {
         let tet = island.cuttable.around(p).next()?;
         return Some(format!("body[{}].fixed", island.body_of_tet(tet)));
     }
+    let handle = solver.handle_of(p.index());
     let mut attachments = island.constraints.attachments.iter();
     let of_handle = attachments.find(|attachment| Some(attachment.number) == handle)?;
     Some(of_handle.field().to_owned())

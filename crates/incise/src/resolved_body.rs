@@ -123,10 +123,7 @@ fn material(field: &str, body: &BodySpec, part: &MaterialSpec) -> Result<Materia
         density: part.density.unwrap_or(body.density),
         damping: part.damping.unwrap_or(body.damping),
     };
-    material.check().map_err(|source| Error::Xpbd {
-        field: field.to_owned(),
-        source,
-    })?;
+    material.check().map_err(Error::xpbd(field))?;
     for (key, number, low, high) in [
         ("young_modulus", material.young_modulus, 1e-6, 1e15),
         ("density", material.density, 1e-6, 1e9),

@@ -7,6 +7,8 @@ mod builder;
 mod edit;
 mod forces;
 mod interaction;
+#[cfg(feature = "gpu")]
+mod on_device;
 mod readback;
 mod set_solver;
 mod snapshot;
@@ -24,10 +26,10 @@ use rayon::prelude::*;
 use web_time::Instant;
 
 use crate::attachment::Support;
-use crate::backend::each;
 use crate::budget;
 use crate::collider::Colliders;
-use crate::compute_device::{ComputeDevice, OpenDevice};
+use crate::compute_device::ComputeDevice;
+use crate::device::OpenDevice;
 use crate::island::Island;
 use crate::island_builder::IslandBuilder;
 use crate::islands::island_of_bodies;
@@ -113,18 +115,6 @@ impl Simulation {
     pub fn with_threads(scene: &Scene, threads: usize) -> Result<Self, Error> {
         let mut builder = SimulationBuilder::from_scene(scene.clone());
         builder.threads(threads);
-        builder.build()
-    }
-
-    /// Creates a simulation of a scene on an open device, such as that of a renderer or of another simulation;
-    /// `solver.backend` is ignored.
-    ///
-    /// # Errors
-    /// Returns the errors of [`Simulation::new`], and one if the device does not support the scene's settings.
-    #[cfg(feature = "gpu")]
-    pub fn on_device(scene: &Scene, gpu: Arc<crate::gpu::GpuContext>) -> Result<Self, Error> {
-        let mut builder = SimulationBuilder::from_scene(scene.clone());
-        builder.device(gpu);
         builder.build()
     }
 
@@ -438,9 +428,9 @@ impl Simulation {
                 .report
                 .warnings
                 .append(&mut island.judged.warnings);
-            let speed = match island.solver.backend().host_max_speed() {
-                Some(speed) => speed,
-                None => self.state.report.max_speed.unwrap_or(0.0),
+            let speed = match self.state.compute_device.gpu {
+                Some(_) => self.state.report.max_speed.unwrap_or(0.0),
+                None => island.solver.host().max_speed(),
             };
             if island.is_absurd(speed, elapsed) {
                 let message = format!(
@@ -580,16 +570,15 @@ impl Simulation {
     pub fn supports(&self) -> Vec<Support> {
         let mut supports = vec![Support::Free; self.mesh().positions.len()];
         for (g, island) in self.state.islands.iter().enumerate() {
-            each!(&island.solver, solver => {
-                for p in 0..solver.particle_count() {
-                    let support = match (solver.is_fixed(p), solver.handle_of(p)) {
-                        (true, _) => Support::Pinned,
-                        (false, Some(_)) => Support::Attached,
-                        (false, None) => continue,
-                    };
-                    supports[self.particle(g, p)] = support;
-                }
-            });
+            let solver = island.solver.host();
+            for p in 0..solver.particle_count() {
+                let support = match (solver.is_fixed(p), solver.handle_of(p)) {
+                    (true, _) => Support::Pinned,
+                    (false, Some(_)) => Support::Attached,
+                    (false, None) => continue,
+                };
+                supports[self.particle(g, p)] = support;
+            }
         }
         supports
     }

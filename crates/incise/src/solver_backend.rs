@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use glam::DVec3;
 use incise_graph::Schedule;
-use incise_xpbd::{Energy, Forces, Pose, Residuals, StepReport, StepSettings, Volume};
+use incise_xpbd::{Energy, ErasedSolver, Pose, Residuals, StepReport, StepSettings, Volume};
 
 use crate::Error;
 use crate::report::Milliseconds;
-use crate::scene::Quantity;
+use crate::scene::{Quantity, SolverSpec};
 
 /// Residuals of the last substep; XPBD has more of them than VBD.
 #[derive(Clone, Copy, Debug)]
@@ -28,18 +28,22 @@ pub(crate) struct Measures {
 }
 
 /// A solver on the CPU in one precision, by XPBD or VBD, or one on a device. Functions that only one kind needs do
-/// nothing in the others.
+/// nothing by default.
 pub(crate) trait SolverBackend {
-    /// Advances by one frame, keeping what [`SolverBackend::last_substep`] needs on request.
-    fn step(
-        &mut self,
-        schedule: &Schedule,
-        settings: &StepSettings,
-        keep: bool,
-    ) -> Result<StepReport, Error>;
+    /// The solver on the CPU, to be read. That of a device has the state of the last readback.
+    fn host(&self) -> &dyn ErasedSolver;
 
-    /// Advances by some of the substeps of a frame; the state is known here afterwards, so that contacts can be found.
-    fn step_part(
+    /// The solver on the CPU, to be edited. The state of a device is read back first; its next step takes the edits over.
+    fn edit(&mut self) -> Result<&mut dyn ErasedSolver, Error>;
+
+    /// Prepares the data of VBD, if the settings ask for it.
+    fn prepare(&mut self, _spec: &SolverSpec) -> Result<(), Error> {
+        Ok(())
+    }
+
+    /// Advances by some of the substeps of a frame, of VBD by the whole frame, keeping what
+    /// [`SolverBackend::last_substep`] needs on request. The state of a device stays there.
+    fn step(
         &mut self,
         schedule: &Schedule,
         settings: &StepSettings,
@@ -56,35 +60,49 @@ pub(crate) trait SolverBackend {
     -> Result<Measures, Error>;
 
     /// The residuals of the last substep, if they were kept.
-    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep>;
+    fn last_substep(&self, substep_time: f64) -> Option<LastSubstep> {
+        let residuals = self.host().residuals(substep_time);
+        residuals.map(LastSubstep::Constraints)
+    }
 
     /// Turns the measurement of forces on or off from the next frame on. A device measures none.
-    fn measure_forces(&mut self, measuring: bool);
+    fn measure_forces(&mut self, _measuring: bool) {}
 
-    /// The mean forces of the last frame, if they were measured.
-    fn forces(&self) -> Option<Forces>;
-
-    /// Sets the pose of a handle at the end of the next frame.
+    /// Sets the pose of a handle at the end of the next frame, without a readback.
     fn move_handle(&mut self, handle: u32, pose: Pose);
 
     /// Bytes of a copy.
-    fn bytes(&self) -> usize;
-
-    /// The largest speed in m/s, unless the state is on a device.
-    fn host_max_speed(&self) -> Option<f64>;
+    fn bytes(&self) -> usize {
+        self.host().bytes()
+    }
 
     /// Updates what VBD keeps after a cut, once tets and volume constraints have been.
-    fn update_vbd(&mut self, changed: Option<&[u32]>, ms: &mut Milliseconds) -> Result<(), Error>;
+    fn update_vbd(
+        &mut self,
+        _changed: Option<&[u32]>,
+        _ms: &mut Milliseconds,
+    ) -> Result<(), Error> {
+        Ok(())
+    }
 
     /// The error that the last frame of two-level VBD left over.
-    fn vbd_error(&self) -> Option<f64>;
+    fn vbd_error(&self) -> Option<f64> {
+        None
+    }
 
     /// Drops the data of VBD.
-    fn end_vbd(&mut self);
+    fn end_vbd(&mut self) {}
 
     /// Makes the state of a device known here; returns how many particles it had to put back since the last time.
-    fn read_back(&mut self) -> Result<usize, Error>;
+    fn read_back(&mut self) -> Result<usize, Error> {
+        Ok(0)
+    }
 
     /// Returns how many particles a device had to put back since the last call, as of the last readback or measurement.
-    fn take_repaired(&mut self) -> usize;
+    fn take_repaired(&mut self) -> usize {
+        0
+    }
+
+    /// Recomputes the data of VBD or of a device and compares.
+    fn check(&self, schedule: &Schedule) -> Result<(), Error>;
 }

@@ -124,10 +124,9 @@ impl Timeline {
             tag: self.added,
             ..CutOptions::default()
         };
-        options.check().map_err(|source| Error::Cut {
-            field: format!("{field}.snap"),
-            source,
-        })?;
+        options
+            .check()
+            .map_err(Error::cut(&format!("{field}.snap")))?;
         self.strokes.push(Stroke {
             field,
             tool,
@@ -514,10 +513,7 @@ impl Stroke {
             }
             Tool::Remove(solid) => carve(cuttable, positions, |x| solid.contains(x), options.tag),
         };
-        let delta = cut.map_err(|source| Error::Cut {
-            field: self.field.clone(),
-            source,
-        })?;
+        let delta = cut.map_err(Error::cut(&self.field))?;
         let joins = matches!(
             self.tool,
             Tool::Sweep { .. } | Tool::Live(_) | Tool::Surface { .. }

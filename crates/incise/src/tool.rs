@@ -110,10 +110,7 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
     };
     let surface = |key: &str, result: Result<TriangleSurface, CutError>, bounds: Bounds| {
         let tool = result.map(|surface| Tool::Surface { surface, bounds });
-        tool.map_err(|source| Error::Cut {
-            field: format!("{field}.{key}"),
-            source,
-        })
+        tool.map_err(Error::cut(&format!("{field}.{key}")))
     };
     Ok(match spec {
         StrokeSpec::Plane {

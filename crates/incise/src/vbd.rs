@@ -174,8 +174,5 @@ fn correction<R: Real>(
         reduction: REDUCTION,
         ..CoarseCorrectionSettings::default()
     };
-    CoarseCorrection::new(stars, settings).map_err(|source| Error::Xpbd {
-        field: "solver".into(),
-        source,
-    })
+    CoarseCorrection::new(stars, settings).map_err(Error::xpbd("solver"))
 }

@@ -7,10 +7,10 @@ use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId};
-use incise_xpbd::{VolumeConstraint, XpbdError};
+use incise_xpbd::{ErasedSolver, VolumeConstraint, XpbdError};
 
 use crate::Error;
-use crate::backend::{AnySolver, each_mut};
+use crate::backend::AnySolver;
 
 /// Volume compliance of each material's body in an island.
 #[derive(Clone, Debug)]
@@ -45,15 +45,14 @@ impl Volumes {
         schedule: &Schedule,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
-        each_mut!(solver, solver => {
-            let list: Vec<VolumeConstraint> = (0..mesh.tets.len())
-                .map(|t| {
-                    let rest = mesh.corners(TetId::new(t));
-                    self.constraint(solver.material_of(t), mesh.tets[t], rest)
-                })
-                .collect();
-            solver.set_volumes(&list, schedule.clone()).map_err(refused)
-        })
+        let solver = solver.edit()?;
+        let constraint = |t: usize| {
+            let rest = mesh.corners(TetId::new(t));
+            self.constraint(solver.material_of(t), mesh.tets[t], rest)
+        };
+        let list: Vec<VolumeConstraint> = (0..mesh.tets.len()).map(constraint).collect();
+        let set = solver.set_volumes(&list, schedule.clone());
+        set.map_err(refused)
     }
 
     /// Applies a delta, after the solver and the schedule have.
@@ -67,24 +66,24 @@ impl Volumes {
         let mesh = cuttable.mesh();
         let mut added: Vec<_> = delta.added.iter().collect();
         added.sort_unstable_by_key(|tet| tet.tet);
-        each_mut!(solver, solver => {
-            for tet in added {
-                let slot = delta.slot_after(tet.tet);
-                let material = solver.material_of(slot.index());
-                let constraint = self.constraint(material, tet.corners, mesh.corners(slot));
-                solver.put_volume(slot.index(), constraint).map_err(refused)?;
-            }
-            for tet in &delta.relinked {
-                solver.relink_volume(tet.tet.index(), tet.after.map(|p| p.0));
-            }
-            // Constraints past the last tet stay in the list, but no schedule names them any more.
-            for tet in &delta.moved {
-                let material = solver.material_of(tet.to.index());
-                let constraint = self.constraint(material, tet.corners, mesh.corners(tet.to));
-                solver.put_volume(tet.to.index(), constraint).map_err(refused)?;
-            }
-            solver.reschedule_volumes(schedule);
-        });
+        let solver = solver.edit()?;
+        let put = |solver: &mut dyn ErasedSolver, slot: TetId, corners: [ParticleId; 4]| {
+            let material = solver.material_of(slot.index());
+            let constraint = self.constraint(material, corners, mesh.corners(slot));
+            let put = solver.put_volume(slot.index(), constraint);
+            put.map_err(refused)
+        };
+        for tet in added {
+            put(solver, delta.slot_after(tet.tet), tet.corners)?;
+        }
+        for tet in &delta.relinked {
+            solver.relink_volume(tet.tet.index(), tet.after.map(|p| p.0));
+        }
+        // Constraints past the last tet stay in the list, but no schedule names them any more.
+        for tet in &delta.moved {
+            put(solver, tet.to, tet.corners)?;
+        }
+        solver.reschedule_volumes(schedule);
         Ok(())
     }
 

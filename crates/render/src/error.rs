@@ -89,7 +89,6 @@ pub enum RenderError {
     #[error(transparent)]
     Gpu(#[from] incise::gpu::GpuError),
     /// The device lacks a required feature or limit.
-    #[cfg(feature = "gpu")]
     #[error("the GPU {adapter} cannot draw: {reason}")]
     Unable {
         /// The adapter's name.

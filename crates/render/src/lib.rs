@@ -8,7 +8,7 @@ mod animation;
 mod camera;
 mod contact_shadow;
 mod error;
-#[cfg(feature = "gpu")]
+#[cfg_attr(not(feature = "gpu"), path = "no_gpu.rs")]
 mod gpu;
 mod image;
 mod normals;

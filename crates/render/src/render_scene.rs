@@ -59,15 +59,15 @@ pub struct RenderScene {
     /// Coloring and revision of the current colors, if they stay valid without changes.
     made_for: Option<(ColorBy, u64)>,
     /// Revision of the skin.
-    topology: u64,
+    pub(crate) topology: u64,
     /// Revision of clusters and colors, which change with each cut and each rebuild.
     plan: u64,
     /// Revision of the triangles' colors.
-    coloring: u64,
+    pub(crate) coloring: u64,
     /// Simulated time of the last update, in s.
     time: f64,
     /// True if a device has made a step since the last topology change other than by its own cuts.
-    device_is_current: bool,
+    pub(crate) device_is_current: bool,
     ground: Option<GroundSpec>,
     obstacles: Vec<ColliderSpec>,
     /// Points of all blades, and the end of each blade in them.
@@ -285,21 +285,6 @@ impl RenderScene {
     /// Colors for a style: one per triangle, or an empty slice.
     pub(crate) fn colors_for(&self, by: ColorBy) -> &[u32] {
         if by == self.shown { &self.colors } else { &[] }
-    }
-
-    #[cfg(feature = "gpu")]
-    pub(crate) fn topology(&self) -> u64 {
-        self.topology
-    }
-
-    #[cfg(feature = "gpu")]
-    pub(crate) fn coloring(&self) -> u64 {
-        self.coloring
-    }
-
-    #[cfg(feature = "gpu")]
-    pub(crate) fn device_is_current(&self) -> bool {
-        self.device_is_current
     }
 
     pub(crate) fn time(&self) -> f64 {

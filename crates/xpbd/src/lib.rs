@@ -46,6 +46,7 @@ mod damping;
 mod degeneracy_jitter;
 mod device;
 mod direction;
+mod erased;
 mod error;
 mod float;
 mod floating_origin;
@@ -81,6 +82,7 @@ pub use constraints::{
     SolidBlade, SurfaceContact, VolumeConstraint, VolumeData,
 };
 pub use device::TetData;
+pub use erased::ErasedSolver;
 pub use error::XpbdError;
 pub use float::Float;
 #[doc(hidden)]

@@ -254,7 +254,7 @@ impl AttachmentKernels {
 
 /// The middle of the anchors on each handle; 0 without any.
 fn middles(solver: &Solver<f32>) -> Vec<DVec3> {
-    let mut sums = vec![(DVec3::ZERO, 0.0); solver.handle_poses(0.0).len()];
+    let mut sums = vec![(DVec3::ZERO, 0.0); solver.handle_count()];
     for data in solver.attachments() {
         let (sum, number) = &mut sums[data.handle as usize];
         *sum += data.anchor;

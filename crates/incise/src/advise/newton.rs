@@ -12,7 +12,7 @@ use incise_reference::{Material, ReferenceBody, ReferenceError};
 use incise_xpbd::Pose;
 
 use super::motion::{Motion, volume};
-use crate::backend::{AnySolver, each};
+use crate::distance::Distances;
 use crate::island::Island;
 use crate::{Error, Scene, Simulation};
 
@@ -135,48 +135,48 @@ impl Part {
     fn new(island: &Island) -> Result<Self, Error> {
         let mesh = island.cuttable.mesh();
         let count = mesh.positions.len();
-        each!(&island.solver, solver => {
-            let materials = (0..mesh.tets.len()).map(|t| {
-                let material = solver.material(solver.material_of(t));
-                Material {
-                    young_modulus: material.young_modulus,
-                    poisson_ratio: material.poisson_ratio,
-                    density: material.density,
-                }
-            });
-            let mut seat = seats(&island.solver, count);
-            let mut at_rest = Vec::new();
-            let mut fixed: Vec<bool> = Vec::new();
-            let mut held = Vec::new();
-            for p in 0..count {
-                let root = seat[p] as usize;
-                if root < p {
-                    seat[p] = seat[root];
-                } else {
-                    seat[p] = u32::try_from(at_rest.len()).expect("no more than there are particles");
-                    at_rest.push(mesh.positions[p]);
-                    fixed.push(false);
-                }
-                let seat = seat[p] as usize;
-                fixed[seat] |= solver.is_fixed(p);
-                if let Some(number) = solver.handle_of(p).filter(|_| !solver.is_fixed(p)) {
-                    let handle = island.constraints.attachments.iter().position(|a| a.number == number);
-                    let handle = handle.expect("attachments of an island hold its particles");
-                    let pose = island.constraints.attachments[handle].pose(0);
-                    let place = pose.rotation.inverse() * (mesh.positions[p] - pose.position);
-                    fixed[seat] = true;
-                    held.push((handle, p, place));
-                }
+        let solver = island.solver.host();
+        let materials = (0..mesh.tets.len()).map(|t| {
+            let material = &solver.materials()[usize::from(solver.material_of(t))];
+            Material {
+                young_modulus: material.young_modulus,
+                poisson_ratio: material.poisson_ratio,
+                density: material.density,
             }
-            let corners = |tet: &[incise_mesh::ParticleId; 4]| tet.map(|p| seat[p.index()]);
-            Ok(Self {
-                tets: mesh.tets.iter().map(corners).collect(),
-                materials: materials.collect(),
-                mesh_at_rest: at_rest,
-                fixed,
-                held,
-                seat,
-            })
+        });
+        let mut seat = seats(&island.constraints.distances, count);
+        let mut at_rest = Vec::new();
+        let mut fixed: Vec<bool> = Vec::new();
+        let mut held = Vec::new();
+        for p in 0..count {
+            let root = seat[p] as usize;
+            if root < p {
+                seat[p] = seat[root];
+            } else {
+                seat[p] = u32::try_from(at_rest.len()).expect("no more than there are particles");
+                at_rest.push(mesh.positions[p]);
+                fixed.push(false);
+            }
+            let seat = seat[p] as usize;
+            fixed[seat] |= solver.is_fixed(p);
+            if let Some(number) = solver.handle_of(p).filter(|_| !solver.is_fixed(p)) {
+                let attachments = &island.constraints.attachments;
+                let handle = attachments.iter().position(|a| a.number == number);
+                let handle = handle.expect("attachments of an island hold its particles");
+                let pose = attachments[handle].pose(0);
+                let place = pose.rotation.inverse() * (mesh.positions[p] - pose.position);
+                fixed[seat] = true;
+                held.push((handle, p, place));
+            }
+        }
+        let corners = |tet: &[incise_mesh::ParticleId; 4]| tet.map(|p| seat[p.index()]);
+        Ok(Self {
+            tets: mesh.tets.iter().map(corners).collect(),
+            materials: materials.collect(),
+            mesh_at_rest: at_rest,
+            fixed,
+            held,
+            seat,
         })
     }
 
@@ -188,16 +188,12 @@ impl Part {
 }
 
 /// Particle -> lowest particle that rigid distance constraints merge it with.
-fn seats(solver: &AnySolver, particles: usize) -> Vec<u32> {
+fn seats(distances: &Distances, particles: usize) -> Vec<u32> {
     let mut seat: Vec<u32> = (0..).take(particles).collect();
-    let pairs: Vec<[u32; 2]> = each!(solver, solver => {
-        let links = solver.distance_schedule().map_or(0, |schedule| schedule.constraint_count());
-        (0..).take(links).map(|link| solver.distance_data(link).particles).collect()
-    });
     // Lower numbers travel along the links until none moves: stitches make short chains.
     loop {
         let mut moved = false;
-        for &[a, b] in &pairs {
+        for [a, b] in distances.ends() {
             let lowest = seat[a as usize].min(seat[b as usize]);
             for p in [a, b] {
                 moved |= seat[p as usize] != lowest;

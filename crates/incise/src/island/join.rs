@@ -11,7 +11,6 @@ use incise_xpbd::StepSettings;
 
 use super::judged::Judged;
 use super::{Constraints, Island, adopt, kappa_limit};
-use crate::backend::each;
 use crate::compute_device::ComputeDevice;
 use crate::contacts::Contacts;
 use crate::island_builder::{TOO_MANY, substeps};
@@ -43,7 +42,7 @@ impl Island {
         let particles = self.positions.len();
         let first_particle = number(particles)?;
         let first_piece = number(self.pieces.total())?;
-        let first_frame = number(each!(&self.solver, solver => solver.handle_poses(0.0).len()))?;
+        let first_frame = number(self.solver.host().handle_count())?;
 
         let (bodies, body_of) = self.bodies_with(other);
         let mut cuttable = self.cuttable.clone();
@@ -153,7 +152,7 @@ impl Island {
             sleep: scene.solver.sleep.map(SleepState::new),
             recluster: scene.solver.recluster.map(Recluster::new),
         };
-        island.solver.positions(&mut island.positions);
+        island.solver.host().positions(&mut island.positions);
         island.judge_settings();
         let before = self
             .judged

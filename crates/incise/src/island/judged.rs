@@ -6,11 +6,10 @@
 
 use glam::DVec3;
 use incise_mesh::TetMesh;
-use incise_xpbd::{Real, Solver, StepSettings, shortest_substep_of_f32};
+use incise_xpbd::{ErasedSolver, StepSettings, shortest_substep_of_f32};
 
 use super::Island;
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
-use crate::backend::each;
 use crate::island_builder::{demands, substeps};
 use crate::method::tet_solve;
 use crate::scene::{Method, Substeps};
@@ -123,8 +122,8 @@ const SLIVER_ENERGY: f64 = 0.1;
 const NO_ENERGY: f64 = 1e-9;
 
 /// Material, kappa and volume of a tet.
-pub(super) fn accuracy_data<R: Real>(
-    solver: &Solver<R>,
+pub(super) fn accuracy_data(
+    solver: &dyn ErasedSolver,
     tet: usize,
     settings: &StepSettings,
 ) -> (u16, f64, f64) {
@@ -161,7 +160,7 @@ impl Island {
     pub(crate) fn judge_settings(&mut self) {
         self.judged.warnings.clear();
         self.judged.misses_accuracy = false;
-        if self.is_too_short_for_f32() && each!(&self.solver, solver => solver.is_single()) {
+        if self.is_too_short_for_f32() && self.solver.host().is_single() {
             let shortest = self.shortest_substep_of_f32();
             let message = format!(
                 "a substep of {:.1e} s is too short for single precision, which needs {shortest:.1e} s: set precision = \"f64\"",
@@ -200,7 +199,7 @@ impl Island {
             // VBD has no contact.
             self.constraints.contacts.is_none(),
         ));
-        let softened = each!(&self.solver, solver => solver.softened());
+        let softened = self.solver.host().softened();
         if softened.tets > 0 {
             let message = format!(
                 "{} of {} tets ({:.1}% of the volume) are softened to kappa_limit",
@@ -210,11 +209,10 @@ impl Island {
             );
             self.warn(WarningCode::Softened, message);
         }
-        self.judged.outside = each!(&self.solver, solver => {
-            let limits = largest_kappas(accuracy, solver.materials(), form);
-            let tets = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings));
-            OutsideVolume::new(limits, tets)
-        });
+        let solver = self.solver.host();
+        let limits = largest_kappas(accuracy, solver.materials(), form);
+        let tets = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings));
+        self.judged.outside = OutsideVolume::new(limits, tets);
     }
 
     fn warn(&mut self, code: WarningCode, message: String) {
@@ -336,10 +334,9 @@ impl Island {
 
     /// Whether a speed in m/s is beyond anything that the material, gravity and moving parts can cause.
     pub(crate) fn is_absurd(&self, speed: f64, elapsed: f64) -> bool {
-        let wave = each!(&self.solver, solver => {
-            let waves = solver.materials().iter().map(|m| (m.young_modulus / m.density).sqrt());
-            waves.fold(0.0, f64::max)
-        });
+        let materials = self.solver.host().materials().iter();
+        let waves = materials.map(|m| (m.young_modulus / m.density).sqrt());
+        let wave = waves.fold(0.0, f64::max);
         let fall = self.settings.gravity.map_or(0.0, |g| g.length() * elapsed);
         let plausible =
             100.0 * wave + 2.0 * fall + 10.0 * self.judged.size / self.settings.time_step;
@@ -371,10 +368,8 @@ impl Island {
         let (Some(energy), Some(of_slivers)) = (measures.energy, measures.sliver_energy) else {
             return;
         };
-        let stiffness = each!(&self.solver, solver => {
-            let moduli = solver.materials().iter().map(|m| m.young_modulus);
-            moduli.fold(0.0, f64::max)
-        });
+        let materials = self.solver.host().materials().iter();
+        let stiffness = materials.map(|m| m.young_modulus).fold(0.0, f64::max);
         let least = NO_ENERGY * stiffness * self.cuttable.mesh().total_volume();
         let is_much = of_slivers > least.max(SLIVER_ENERGY * energy.elastic);
         if self.judged.sliver_energy_reported || !is_much {
@@ -402,6 +397,6 @@ impl Island {
 
     /// The largest kappa of a tet, had none been softened. O(tets).
     pub(crate) fn kappa(&self) -> f64 {
-        each!(&self.solver, solver => solver.kappa(self.settings.substep_time()))
+        self.solver.host().kappa(self.settings.substep_time())
     }
 }

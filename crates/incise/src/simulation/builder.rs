@@ -4,19 +4,17 @@
 //! holds a [`Scene`] and the meshes in memory, so both ways give bit-identical simulations. Cost: that of the
 //! simulation.
 
-#[cfg(feature = "gpu")]
-use std::sync::Arc;
-
 use glam::DVec3;
 use incise_mesh::TetMesh;
 
 use crate::attachment::AttachmentHandle;
 use crate::collider::ColliderHandle;
-use crate::compute_device::{ComputeDevice, OpenDevice};
+use crate::compute_device::ComputeDevice;
+use crate::device::OpenDevice;
 use crate::distance::DistanceHandle;
 use crate::scene::{
-    AttachmentSpec, BodySpec, ColliderSpec, ContactSpec, DistanceSpec, GroundSpec, MaterialSpec,
-    Region, ReportSpec, SolverSpec, StrokeSpec,
+    AttachmentSpec, Backend, BodySpec, ColliderSpec, ContactSpec, DistanceSpec, GroundSpec,
+    MaterialSpec, Region, ReportSpec, SolverSpec, StrokeSpec,
 };
 use crate::validate::value;
 use crate::{Error, Scene, Simulation};
@@ -176,7 +174,7 @@ pub struct SimulationBuilder {
     /// For each body of the scene its mesh, unless the scene names a file or a shape.
     meshes: Vec<Option<TetMesh>>,
     threads: Option<usize>,
-    device: OpenDevice,
+    pub(super) device: OpenDevice,
 }
 
 impl SimulationBuilder {
@@ -227,13 +225,6 @@ impl SimulationBuilder {
         self
     }
 
-    /// Computes on an open GPU device, for example that of a renderer.
-    #[cfg(feature = "gpu")]
-    pub fn device(&mut self, gpu: Arc<crate::gpu::GpuContext>) -> &mut Self {
-        self.device.gpu = Some(gpu);
-        self
-    }
-
     /// Adds a body. Its values are checked by [`SimulationBuilder::build`].
     pub fn add_body(&mut self, body: Body) -> BodyHandle {
         let handle = BodyHandle(self.scene.body.len());
@@ -275,23 +266,14 @@ impl SimulationBuilder {
     /// If there is no body, a value lies outside its range, a mesh is invalid or cannot be read, a pinned particle does
     /// not exist, the threads cannot be started, or the device does not support the settings.
     pub fn build(self) -> Result<Simulation, Error> {
-        let scene = self.scene;
-        #[cfg(feature = "gpu")]
-        let scene = match self.device.gpu {
-            Some(_) => computed_on_gpu(scene),
-            None => scene,
-        };
+        let mut scene = self.scene;
+        if self.device.is_some() {
+            scene.solver.backend = Backend::Gpu;
+        }
         let pool = self.threads.map(thread_pool).transpose()?;
         let compute_device = ComputeDevice::choose(&scene, &self.device)?;
         Simulation::build(scene, &self.meshes, compute_device, pool)
     }
-}
-
-/// The scene with the GPU as its backend, whatever backend it names.
-#[cfg(feature = "gpu")]
-fn computed_on_gpu(mut scene: Scene) -> Scene {
-    scene.solver.backend = crate::scene::Backend::Gpu;
-    scene
 }
 
 fn thread_pool(threads: usize) -> Result<rayon::ThreadPool, Error> {

@@ -12,7 +12,7 @@ use super::Simulation;
 use super::builder::{Body, BodyHandle};
 use super::state::{Removal, State};
 use crate::attachment::{Attachment, AttachmentHandle};
-use crate::backend::{AnySolver, each, each_mut};
+use crate::backend::AnySolver;
 use crate::collider::{self, ColliderHandle};
 use crate::distance::DistanceHandle;
 use crate::island::Island;
@@ -555,15 +555,14 @@ impl Simulation {
         let mut hit = Vec::new();
         let mut mass = 0.0;
         for (g, island) in self.state.islands.iter().enumerate() {
-            each!(&island.solver, solver => {
-                for p in 0..solver.particle_count() {
-                    let is_near = solver.position(p).distance(point) <= radius;
-                    if is_near && solver.is_free(p) {
-                        mass += solver.mass(p);
-                        hit.push((g, p));
-                    }
+            let solver = island.solver.host();
+            for p in 0..solver.particle_count() {
+                let is_near = solver.position(p).distance(point) <= radius;
+                if is_near && solver.is_free(p) {
+                    mass += solver.mass(p);
+                    hit.push((g, p));
                 }
-            });
+            }
         }
         if hit.is_empty() {
             return Ok(false);
@@ -573,9 +572,8 @@ impl Simulation {
         for (g, p) in hit {
             let island = &mut self.state.islands[g];
             island.wake();
-            each_mut!(&mut island.solver, solver => {
-                solver.set_velocity(p, solver.velocity(p) + change);
-            });
+            let solver = island.solver.edit()?;
+            solver.set_velocity(p, solver.velocity(p) + change);
         }
         Ok(true)
     }

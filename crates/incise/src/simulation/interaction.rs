@@ -8,7 +8,6 @@
 use glam::DVec3;
 
 use super::Simulation;
-use crate::backend::{each, each_mut};
 use crate::scene::SolidBladeSpec;
 use crate::validate::{coordinates, value, within};
 use crate::{Error, Grab, solid_blade};
@@ -233,21 +232,19 @@ impl Simulation {
     pub fn set_velocities(&mut self, velocity: impl Fn(DVec3) -> DVec3) -> Result<(), Error> {
         self.read_back()?;
         for island in &self.state.islands {
-            each!(&island.solver, solver => {
-                for p in 0..solver.particle_count() {
-                    coordinates("velocity", velocity(solver.position(p)).to_array())?;
-                }
-            });
+            let solver = island.solver.host();
+            for p in 0..solver.particle_count() {
+                coordinates("velocity", velocity(solver.position(p)).to_array())?;
+            }
         }
         for island in &mut self.state.islands {
             island.wake();
-            each_mut!(&mut island.solver, solver => {
-                for p in 0..solver.particle_count() {
-                    if !solver.is_fixed(p) {
-                        solver.set_velocity(p, velocity(solver.position(p)));
-                    }
+            let solver = island.solver.edit()?;
+            for p in 0..solver.particle_count() {
+                if !solver.is_fixed(p) {
+                    solver.set_velocity(p, velocity(solver.position(p)));
                 }
-            });
+            }
         }
         Ok(())
     }
@@ -290,13 +287,13 @@ mod tests {
                 simulation.release(other).unwrap();
                 step_at(&mut simulation, 9);
             }
-            let solver = &simulation.state.islands[0].solver;
-            let (handles, hanging) = each!(solver, solver => {
-                let ways = solver.handle_poses(1.0).map(|pose| pose.position);
-                (ways.collect::<Vec<_>>(), solver.attachments().len())
-            });
-            // Their ways do not add up.
-            assert_eq!((handles, hanging), (vec![DVec3::ZERO; 2], 0));
+            // The handles go back in a frame: their ways do not add up.
+            simulation.step().unwrap();
+            let solver = simulation.state.islands[0].solver.host();
+            let handles = (0..).take(solver.handle_count());
+            let at = handles.map(|handle| solver.handle(handle).position);
+            assert_eq!(at.collect::<Vec<_>>(), [DVec3::ZERO; 2]);
+            assert!((0..solver.particle_count()).all(|p| solver.handle_of(p).is_none()));
             simulation.check().unwrap();
         }
     }

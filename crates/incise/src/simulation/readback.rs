@@ -10,7 +10,6 @@ use web_time::Instant;
 
 use super::Simulation;
 use crate::Error;
-use crate::backend::each;
 use crate::measure::{
     by_body, contact, energy, kappa, max_speed, residual, residuals_of_tets, softened, states,
     volume,
@@ -163,7 +162,7 @@ impl Simulation {
         let particles = 0..self.mesh().positions.len();
         let of_particle = |p| {
             let (island, particle) = self.location_of(ParticleId::new(p));
-            each!(&self.state.islands[island].solver, solver => solver.velocity(particle))
+            self.state.islands[island].solver.host().velocity(particle)
         };
         particles.map(of_particle).collect()
     }
@@ -226,16 +225,6 @@ impl Simulation {
             Some(merged) => merged.location(particle),
             None => (0, particle.index()),
         }
-    }
-
-    /// Returns the device solvers of the islands of bodies, for renderers; none on the CPU. [`Simulation::location_of`]
-    /// maps particles to them.
-    #[cfg(feature = "gpu")]
-    pub fn device_solvers(&self) -> impl Iterator<Item = &crate::gpu::GpuSolver> + '_ {
-        self.state
-            .islands
-            .iter()
-            .filter_map(|island| island.solver.device())
     }
 
     /// The forces between pieces that touched in the last frame, in a scene with contact, ascending by island and pieces.
@@ -329,7 +318,7 @@ impl Simulation {
     /// Takes over the positions of the solvers.
     pub(super) fn collect_positions(&mut self) {
         for island in &mut self.state.islands {
-            island.solver.positions(&mut island.positions);
+            island.solver.host().positions(&mut island.positions);
         }
         if let Some(merged) = &mut self.state.dependents.merged {
             merged.collect_positions(&self.state.islands);

@@ -166,36 +166,6 @@ impl Simulation {
         Ok(())
     }
 
-    /// Offers an open device, typically that of a window. [`Simulation::set_solver`] uses it when it next moves the
-    /// simulation to a device. Without an offer it uses a device that the simulation has left, or opens one as
-    /// [`Simulation::new`] does.
-    ///
-    /// ```
-    /// use std::sync::Arc;
-    ///
-    /// use incise::gpu::{GpuContext, GpuError, GpuOptions};
-    /// use incise::scene::Backend;
-    /// use incise::{Scene, Simulation};
-    ///
-    /// let gpu = match GpuContext::new(&GpuOptions::from_env()) {
-    ///     Ok(gpu) => Arc::new(gpu),
-    ///     Err(GpuError::NoAdapter { .. }) => return Ok(()),
-    ///     Err(other) => return Err(other.into()),
-    /// };
-    /// let scene = Scene::from_toml("[[body]]\nshape = { kind = \"sphere\", tets = 300 }")?;
-    /// let mut simulation = Simulation::new(&scene)?;
-    /// simulation.offer_device(gpu);
-    /// simulation.step()?;
-    /// let spec = simulation.solver_spec().clone().with(|solver| solver.backend = Backend::Gpu);
-    /// simulation.set_solver(&spec)?;
-    /// assert_eq!(simulation.step()?.backend, "gpu");
-    /// # Ok::<(), incise::Error>(())
-    /// ```
-    #[cfg(feature = "gpu")]
-    pub fn offer_device(&mut self, gpu: std::sync::Arc<crate::gpu::GpuContext>) {
-        self.open_device.gpu = Some(gpu);
-    }
-
     /// Chooses the compute device for other settings.
     fn compute_device_for(&self, scene: &Scene) -> Result<ComputeDevice, Error> {
         let (before, after) = (&self.state.solver, &scene.solver);
@@ -204,16 +174,14 @@ impl Simulation {
         {
             return Ok(self.state.compute_device.clone());
         }
-        ComputeDevice::choose(scene, &self.state.compute_device.or(&self.open_device))
+        let present = self.state.compute_device.gpu.as_ref();
+        ComputeDevice::choose(scene, &present.or(self.open_device.as_ref()).cloned())
     }
 
     /// Keeps the present device open, unless another one is kept.
     pub(super) fn leave_device(&mut self) {
-        #[cfg(feature = "gpu")]
-        if self.open_device.gpu.is_none() {
-            self.open_device
-                .gpu
-                .clone_from(&self.state.compute_device.gpu);
+        if self.open_device.is_none() {
+            self.open_device.clone_from(&self.state.compute_device.gpu);
         }
     }
 }

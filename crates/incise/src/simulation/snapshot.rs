@@ -9,18 +9,19 @@
 //! Cost: a copy of all arrays, 0.25 to 0.4 kB a tet, with VBD up to 0.6; the first step after a restore rebuilds the
 //! layout and sends a device all data.
 
-#[cfg(feature = "gpu")]
 use std::sync::Arc;
 
 use super::Simulation;
 use super::state::{Dependents, State};
-use crate::compute_device::{ComputeDevice, OpenDevice};
+use crate::backend::AnySolver;
+use crate::compute_device::ComputeDevice;
+use crate::device::{GpuContext, OpenDevice};
 use crate::island::Island;
 use crate::merged_mesh::MergedMesh;
 use crate::method::check_forces;
 use crate::recluster::Recluster;
 use crate::report::FrameReport;
-use crate::scene::{Quantity, ReportSpec};
+use crate::scene::{Quantity, ReportSpec, SolverSpec};
 use crate::validate::value;
 use crate::{Error, Scene};
 
@@ -172,7 +173,6 @@ impl Simulation {
         // What is under way on a device ends here, with its count of repairs.
         self.read_back()?;
         let mut state = snapshot.0.clone();
-        #[cfg(feature = "gpu")]
         if let Some(gpu) = state.compute_device.gpu.clone() {
             let islands = std::mem::take(&mut state.islands);
             state.islands = take_over(&mut self.state.islands, islands, &gpu, &state.solver)?;
@@ -225,7 +225,6 @@ impl Simulation {
                 state.compute_device = ComputeDevice::choose(&scene, &OpenDevice::default())?;
             }
         }
-        #[cfg(feature = "gpu")]
         if let Some(gpu) = state.compute_device.gpu.clone() {
             let islands = std::mem::take(&mut state.islands);
             state.islands = take_over(&mut [], islands, &gpu, &state.solver)?;
@@ -269,14 +268,12 @@ impl Simulation {
 ///
 /// # Errors
 /// If the device is lost or out of memory; the old islands are as they were.
-#[cfg(feature = "gpu")]
 fn take_over(
     old: &mut [Island],
     mut new: Vec<Island>,
-    gpu: &Arc<crate::gpu::GpuContext>,
-    spec: &crate::scene::SolverSpec,
+    gpu: &Arc<GpuContext>,
+    spec: &SolverSpec,
 ) -> Result<Vec<Island>, Error> {
-    use crate::backend::AnySolver;
     let mut lent = Vec::with_capacity(new.len());
     for (i, new) in new.iter_mut().enumerate() {
         let lends = match old.get(i).map(|old| &old.solver) {
@@ -295,7 +292,7 @@ fn take_over(
                 (&mut new.solver, &mut old.solver)
             {
                 let host = std::mem::replace(&mut backend.solver, incise_xpbd::Solver::new(&[]));
-                device.solver.replace(host);
+                device.replace(host);
             }
         }
     }

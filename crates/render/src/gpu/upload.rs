@@ -111,7 +111,7 @@ impl Upload {
         simulation: &Simulation,
         solvers: &[&GpuSolver],
     ) -> Result<(), RenderError> {
-        let skin = (render_scene.topology(), !solvers.is_empty());
+        let skin = (render_scene.topology, !solvers.is_empty());
         // The key is set only after the upload succeeded.
         if self.skin != skin {
             self.skin = NOTHING;
@@ -133,10 +133,10 @@ impl Upload {
         let parts: Vec<_> = self.origins.iter().map(part).collect();
         self.parts.replace(gpu, &parts)?;
         let colors = render_scene.colors_for(style.color_by);
-        if !colors.is_empty() && self.coloring != render_scene.coloring() {
+        if !colors.is_empty() && self.coloring != render_scene.coloring {
             self.coloring = 0;
             self.colors.replace(gpu, colors)?;
-            self.coloring = render_scene.coloring();
+            self.coloring = render_scene.coloring;
         }
         let flags = u32::from(style.wireframe)
             | u32::from(style.smooth) << 1

@@ -124,6 +124,24 @@ impl<R: Float> Solver<R> {
         self.set_weight(particle);
     }
 
+    /// Detaches all particles of a handle; they keep their velocities.
+    ///
+    /// O(attachments), and O(log n + attachments of higher particles) for each that is detached.
+    pub fn detach_all(&mut self, handle: u32) {
+        let attached = self.attachments().filter(|a| a.handle == handle);
+        let particles: Vec<u32> = attached.map(|a| a.particle).collect();
+        // The list of attachments closes up behind each of them.
+        for p in particles.into_iter().rev() {
+            self.detach(p as usize);
+        }
+    }
+
+    /// Returns the number of handles.
+    #[must_use]
+    pub fn handle_count(&self) -> usize {
+        self.constraints.attachments.handle_count()
+    }
+
     /// Returns the handle that a particle is attached to.
     #[must_use]
     pub fn handle_of(&self, particle: usize) -> Option<u32> {
