@@ -15,9 +15,8 @@
 use fearless_simd::Level;
 
 use crate::Float;
-use crate::gauss_seidel;
+use crate::gauss_seidel::{self, Sharing};
 use crate::layout::Layout;
-use crate::pace::Pace;
 use crate::particles::Particles;
 use crate::simd_kernel::Pass;
 use crate::substep::Factors;
@@ -27,14 +26,14 @@ use crate::substep::Factors;
 pub(crate) struct Damping<R: Float> {
     /// Copies of velocities and inverse masses that threads may share, while some material is damped.
     cells: Vec<R::Particle>,
-    pace: Pace,
+    sharing: Sharing<R>,
 }
 
 impl<R: Float> Default for Damping<R> {
     fn default() -> Self {
         Self {
             cells: Vec::new(),
-            pace: Pace::default(),
+            sharing: Sharing::default(),
         }
     }
 }
@@ -57,6 +56,7 @@ impl<R: Float> Damping<R> {
         }));
         let pass = Pass {
             layout,
+            corners: &layout.blocks.particles,
             positions: &particles.cells,
             multipliers: &[],
             corrections: &[],
@@ -64,7 +64,7 @@ impl<R: Float> Damping<R> {
             iterated: false,
             factors,
         };
-        gauss_seidel::damp(level, &pass, &mut self.cells, &mut self.pace);
+        gauss_seidel::damp(level, &pass, &mut self.cells, &mut self.sharing);
         for (velocity, cell) in particles.velocities.iter_mut().zip(&self.cells) {
             let [x, y, z, _] = R::read(cell);
             *velocity = R::vector(x, y, z);

@@ -39,7 +39,7 @@ pub(crate) struct Pace {
 
 impl Pace {
     /// Whether the next pass runs on several threads.
-    fn is_shared(&self) -> bool {
+    pub(crate) fn is_shared(&self) -> bool {
         self.measured >= WARM_UP && self.in_a_row < IN_A_ROW && self.recovery <= 0.0
     }
 

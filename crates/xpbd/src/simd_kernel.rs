@@ -52,9 +52,11 @@ use memory::{
 };
 
 /// The input of a pass over the tets.
-#[derive(Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Pass<'a, R: Float> {
     pub(crate) layout: &'a Layout<R>,
+    /// Slot of the layout -> corners, as numbers of the particles of the pass.
+    pub(crate) corners: &'a [[u32; 4]],
     /// Of [`Damping`] only, else empty: the particles, of which the pass changes velocities.
     pub(crate) positions: &'a [R::Particle],
     /// Block, number, lane: the multipliers; empty if not kept.
@@ -128,7 +130,7 @@ impl BlockKernel for PlainSplit {
         let lanes = R::Lanes::<S>::LEN;
         let blocks = &pass.layout.blocks;
         let active = blocks.active[block];
-        let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
+        let corners = &pass.corners[block * lanes..(block + 1) * lanes];
         let tets = Tets::<R, S>::new(simd, pass, block);
         let x = gather::<R, S>(simd, particles, corners, buffers);
         let change = tets.split(&x, &tets.gradients(), buffers, None);
@@ -240,7 +242,7 @@ fn solve_block<R: Float, S: Simd>(
     let lanes = R::Lanes::<S>::LEN;
     let blocks = &pass.layout.blocks;
     let active = blocks.active[block];
-    let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
+    let corners = &pass.corners[block * lanes..(block + 1) * lanes];
     let mut x = gather::<R, S>(simd, particles, corners, buffers);
     let tets = Tets::<R, S>::new(simd, pass, block);
     let q = tets.gradients();
@@ -317,7 +319,7 @@ fn damp_block<R: Float, S: Simd>(
     let lanes = R::Lanes::<S>::LEN;
     let blocks = &pass.layout.blocks;
     let active = blocks.active[block];
-    let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
+    let corners = &pass.corners[block * lanes..(block + 1) * lanes];
     let x = gather::<R, S>(simd, &mut Shared(pass.positions), corners, buffers);
     let mut v = gather::<R, S>(simd, velocities, corners, buffers);
     let tets = Tets::<R, S>::new(simd, pass, block);
@@ -951,7 +953,7 @@ fn refuse<R: Float, S: Simd>(
 fn keep_refused<R: Float, S: Simd>(pass: &Pass<'_, R>, block: usize, offer: &Offer<R, S>) {
     let lanes = R::Lanes::<S>::LEN;
     let blocks = &pass.layout.blocks;
-    let corners = &blocks.particles[block * lanes..(block + 1) * lanes];
+    let corners = &pass.corners[block * lanes..(block + 1) * lanes];
     for (lane, particles) in corners.iter().enumerate() {
         let weights = [0, 1, 2, 3].map(|k| offer.weights[k][lane]);
         let is_empty = blocks.active[block] & (1 << lane) == 0;

@@ -15,13 +15,13 @@ use fearless_simd::Level;
 use crate::constraints::Constraints;
 use crate::damping::Damping;
 use crate::forces::ForceMeter;
-use crate::gauss_seidel;
+use crate::gauss_seidel::{self, Sharing};
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
-use crate::pace::Pace;
 use crate::particles::Particles;
 use crate::simd_kernel::Pass;
 use crate::substep::Substep;
+use crate::team::keep_awake;
 use crate::tets::TetSet;
 use crate::{Float, Method, StepSettings, TetSolve};
 
@@ -74,9 +74,8 @@ pub(crate) struct Stepper<R: Float> {
     multipliers: Vec<R::Atomic>,
     #[cfg_attr(feature = "serde", serde(skip))]
     jacobi: Option<Jacobi<R>>,
-    /// Whether threads pay, as passes have shown so far.
     #[cfg_attr(feature = "serde", serde(skip))]
-    pace: Pace,
+    sharing: Sharing<R>,
     #[cfg_attr(feature = "serde", serde(skip))]
     damping: Damping<R>,
     pub(crate) last: LastSubstep<R>,
@@ -91,7 +90,7 @@ impl<R: Float> Default for Stepper<R> {
             level: Level::new(),
             multipliers: Vec::new(),
             jacobi: None,
-            pace: Pace::default(),
+            sharing: Sharing::default(),
             damping: Damping::default(),
             last: LastSubstep {
                 predicted: Vec::new(),
@@ -139,11 +138,19 @@ impl<R: Float> Stepper<R> {
         }
         self.last.clear();
         let (mut repaired, ends) = (0, part.end == settings.substeps);
-        for number in part {
-            let keep = keep && number + 1 == settings.substeps;
-            let substep = Substep::new(settings, number, keep);
-            let meter = meter.as_deref_mut();
-            repaired += self.substep(particles, tets, constraints, meter, &substep, keep);
+        let is_shared = self.sharing.pace.is_shared();
+        let substeps = || {
+            for number in part {
+                let keep = keep && number + 1 == settings.substeps;
+                let substep = Substep::new(settings, number, keep);
+                let meter = meter.as_deref_mut();
+                repaired += self.substep(particles, tets, constraints, meter, &substep, keep);
+            }
+        };
+        if is_shared {
+            keep_awake(substeps);
+        } else {
+            substeps();
         }
         particles.refused.clear();
         self.meter = meter;
@@ -224,7 +231,7 @@ impl<R: Float> Stepper<R> {
             level,
             multipliers,
             jacobi,
-            pace,
+            sharing,
             ..
         } = self;
         let settings = substep.settings;
@@ -234,6 +241,7 @@ impl<R: Float> Stepper<R> {
         }
         let pass = Pass {
             layout,
+            corners: &layout.blocks.particles,
             positions: &[],
             multipliers,
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
@@ -246,7 +254,7 @@ impl<R: Float> Stepper<R> {
             settings.tet_solve,
             &pass,
             &mut particles.cells,
-            pace,
+            sharing,
         );
         let Some(jacobi) = jacobi else { return };
         jacobi.apply(&particles.cells);

@@ -150,7 +150,10 @@ impl<R: Float> TetSet<R> {
         lanes: usize,
     ) {
         let uniform = self.has_one_set_of_constants();
-        layout.update(schedule, lanes, uniform, |t| self.ingredients(particles, t));
+        let positions = || (0..particles.len()).map(|p| particles.local(p)).collect();
+        layout.update(schedule, lanes, uniform, positions, |t| {
+            self.ingredients(particles, t)
+        });
     }
 
     /// Compares what the layout becomes with the next schedule with schedule, tets and masses, to the bit. O(tets).

@@ -2,6 +2,7 @@
 
 use glam::DVec4;
 
+use super::places::Places;
 use crate::Float;
 use crate::neo_hookean::TetConstraint;
 
@@ -24,6 +25,8 @@ pub(crate) struct Blocks<R> {
     pub(crate) active: Vec<u16>,
     /// Slot -> corners; particle 0 in slots without a tet.
     pub(crate) particles: Vec<[u32; 4]>,
+    /// Slot -> places of the corners; place 0 in slots without a tet.
+    pub(crate) places: Vec<[u32; 4]>,
     /// Slot -> tet, where there is one.
     pub(super) tets: Vec<u32>,
     /// Block, number, lane: what a tet is at rest.
@@ -60,6 +63,7 @@ impl<R: Float> Default for Blocks<R> {
             uniform: true,
             active: Vec::new(),
             particles: Vec::new(),
+            places: Vec::new(),
             tets: Vec::new(),
             rest: Vec::new(),
             constants: Vec::new(),
@@ -79,6 +83,7 @@ impl<R: Float> Blocks<R> {
         (self.lanes, self.uniform) = (lanes, uniform);
         self.active.clear();
         self.particles.clear();
+        self.places.clear();
         self.tets.clear();
         self.rest.clear();
         self.constants.clear();
@@ -89,6 +94,7 @@ impl<R: Float> Blocks<R> {
         let slots = blocks * self.lanes;
         self.active.resize(blocks, 0);
         self.particles.resize(slots, [0; 4]);
+        self.places.resize(slots, [0; 4]);
         self.tets.resize(slots, NONE);
         self.rest.resize(slots * REST, R::ZERO);
         if !self.uniform {
@@ -97,10 +103,11 @@ impl<R: Float> Blocks<R> {
     }
 
     /// Writes the numbers of a tet into the slot that it has.
-    pub(super) fn fill(&mut self, slot: usize, ingredients: &Ingredients<R>) {
+    pub(super) fn fill(&mut self, slot: usize, ingredients: &Ingredients<R>, places: &mut Places) {
         let lanes = self.lanes;
         let (block, lane) = (slot / lanes, slot % lanes);
         self.particles[slot] = ingredients.tet.particles;
+        self.places[slot] = ingredients.tet.particles.map(|p| places.place(p));
         if self.uniform {
             self.constant = ingredients.constants;
         } else {

@@ -46,6 +46,10 @@ impl<R: Float> Layout<R> {
                     let slot = block * self.blocks.lanes + lane;
                     if self.slot(tet as usize) != Some((block, lane))
                         || !self.blocks.has(slot, tet, &ingredients(tet))
+                        || !(0..4).all(|k| {
+                            let corner = self.blocks.particles[slot][k];
+                            self.places.has(corner, self.blocks.places[slot][k])
+                        })
                     {
                         return wrong("tet", tet as usize);
                     }

@@ -3,18 +3,21 @@
 //! Clusters of one color share no particle, so as many of them as a processor has lanes are solved side by side: lane
 //! by lane the first tet of each, then the second. A *group* is such a set of clusters (`groups.rs`), a *block* one tet
 //! of each (`blocks.rs`). The grouping changes the order of work only, since each cluster sees only its own particles.
+//! Groups of a color follow each other in space, and so do the copies of particles that several threads work on
+//! (`places.rs`): thus each thread keeps to its own part of the body.
 //!
 //! A layout is updated with its schedule (`update.rs`): groups keep their blocks, a changed cluster is moved from its
 //! lane to a free one, and a tet whose corners, rest shape or masses changed is marked and filled in again. So a frame
 //! after a cut costs what the cut touched. Another schedule, another material or a changed mass whose incident tets
 //! were not named rebuilds all.
 //!
-//! Cost: O(tets) to build, 80 bytes a tet in single precision; to update, O(changed clusters and marked tets),
+//! Cost: O(tets) to build and O(particles log particles) for their order, 96 bytes a tet in single precision; to update, O(changed clusters and marked tets),
 //! amortized.
 
 mod blocks;
 mod check;
 mod groups;
+mod places;
 mod update;
 
 use std::ops::Range;
@@ -25,6 +28,7 @@ use crate::Float;
 use blocks::Blocks;
 pub(crate) use blocks::{CONSTANTS, Ingredients, REST};
 use groups::Groups;
+use places::Places;
 
 /// No slot.
 const NONE: u32 = u32::MAX;
@@ -36,6 +40,8 @@ pub(crate) struct Layout<R> {
     revision: Option<u64>,
     pub(crate) blocks: Blocks<R>,
     groups: Groups,
+    /// The order of particles for several threads.
+    pub(crate) places: Places,
     /// Tet -> slot in the blocks.
     slots: Vec<u32>,
     /// Tets in the layout that have changed since, and for each tet whether it is listed.
@@ -51,6 +57,7 @@ impl<R: Float> Default for Layout<R> {
             revision: None,
             blocks: Blocks::default(),
             groups: Groups::default(),
+            places: Places::default(),
             slots: Vec::new(),
             dirty: Vec::new(),
             marked: Vec::new(),

@@ -43,7 +43,7 @@ impl Plan {
         let coloring = Coloring::new((0..clusters).map(|k| ColorId(k % 30)).collect());
         let schedule = Schedule::new(&clustering, &coloring);
         let mut layout = Layout::default();
-        let filled = layout.update(&schedule, LANES, true, ingredients);
+        let filled = layout.update(&schedule, LANES, true, Vec::new, ingredients);
         assert_eq!(filled, 5 * clusters as usize);
         Self {
             clustering,
@@ -82,7 +82,9 @@ impl Plan {
             &std::mem::take(&mut self.clusters),
         );
         assert!(!self.layout.fits(&self.schedule));
-        let filled = self.layout.update(&self.schedule, LANES, true, ingredients);
+        let filled = self
+            .layout
+            .update(&self.schedule, LANES, true, Vec::new, ingredients);
         assert!(self.layout.fits(&self.schedule));
         self.layout.check(&self.schedule, ingredients).unwrap();
         filled
@@ -149,7 +151,9 @@ fn a_touched_tet_is_filled_in_once() {
         plan.layout.touch(tet);
     }
     assert!(!plan.layout.fits(&plan.schedule));
-    let filled = plan.layout.update(&plan.schedule, LANES, true, ingredients);
+    let filled = plan
+        .layout
+        .update(&plan.schedule, LANES, true, Vec::new, ingredients);
     assert_eq!(filled, 3);
     // Also if its cluster moves at the same time.
     plan.layout.touch(7);
@@ -165,10 +169,18 @@ fn another_schedule_is_laid_out() {
     assert!(plan.layout.fits(&copy));
     let equal = Schedule::new(&plan.clustering, &plan.coloring);
     assert!(!plan.layout.fits(&equal));
-    assert_eq!(plan.layout.update(&equal, LANES, true, ingredients), 250);
+    assert_eq!(
+        plan.layout
+            .update(&equal, LANES, true, Vec::new, ingredients),
+        250
+    );
     plan.layout.forget();
     assert!(!plan.layout.fits(&equal));
-    assert_eq!(plan.layout.update(&equal, LANES, true, ingredients), 250);
+    assert_eq!(
+        plan.layout
+            .update(&equal, LANES, true, Vec::new, ingredients),
+        250
+    );
 }
 
 /// A sliver a hundred thousand times as wide as thick does not move along its thin direction, in which its gradients

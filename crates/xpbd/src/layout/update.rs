@@ -1,6 +1,6 @@
 //! Builds a layout and updates it with its schedule.
 //!
-//! New groups take the clusters of a color by size, so that few lanes are idle. Later a changed cluster stays in its
+//! New groups take the clusters of a color by size, so that few lanes are idle, and those of one size by where they are. Later a changed cluster stays in its
 //! lane if its color is the same and its group has enough blocks. Otherwise it goes to the group of its color that was
 //! opened last, or opens one.
 //!
@@ -10,6 +10,7 @@
 
 use std::cmp::Reverse;
 
+use glam::DVec3;
 use incise_graph::{ClusterId, LaneGroup, Schedule};
 
 use super::groups::Usage;
@@ -18,12 +19,13 @@ use crate::Float;
 
 impl<R: Float> Layout<R> {
     /// Makes this the layout of a schedule; returns how many tets were filled in. `uniform` says that all tets have the
-    /// same constants.
+    /// same constants; `positions` gives those of all particles, if all is rebuilt.
     pub(crate) fn update(
         &mut self,
         schedule: &Schedule,
         lanes: usize,
         uniform: bool,
+        positions: impl Fn() -> Vec<DVec3>,
         ingredients: impl Fn(u32) -> Ingredients<R>,
     ) -> usize {
         let _span = tracing::debug_span!("xpbd::layout").entered();
@@ -31,10 +33,10 @@ impl<R: Float> Layout<R> {
         let changes = revision.and_then(|revision| schedule.changes_since(revision));
         let mut filled = match changes {
             Some(changes) => self.patch(schedule, changes, &ingredients),
-            None => self.rebuild(schedule, lanes, uniform, &ingredients),
+            None => self.rebuild(schedule, lanes, uniform, &positions(), &ingredients),
         };
         if 2 * self.groups.free_blocks > self.blocks.len() {
-            filled += self.rebuild(schedule, lanes, uniform, &ingredients);
+            filled += self.rebuild(schedule, lanes, uniform, &positions(), &ingredients);
         }
         self.revision = Some(schedule.revision());
         filled
@@ -45,8 +47,10 @@ impl<R: Float> Layout<R> {
         schedule: &Schedule,
         lanes: usize,
         uniform: bool,
+        positions: &[DVec3],
         ingredients: &impl Fn(u32) -> Ingredients<R>,
     ) -> usize {
+        self.places.reset(positions);
         self.blocks.reset(lanes, uniform);
         self.groups.reset(lanes, schedule.color_count());
         self.slots.clear();
@@ -114,7 +118,8 @@ impl<R: Float> Layout<R> {
             if std::mem::take(&mut self.marked[tet as usize]) {
                 let slot = self.slots[tet as usize];
                 if slot != NONE {
-                    self.blocks.fill(slot as usize, &ingredients(tet));
+                    self.blocks
+                        .fill(slot as usize, &ingredients(tet), &mut self.places);
                     filled += 1;
                 }
             }
@@ -144,7 +149,12 @@ impl<R: Float> Layout<R> {
         let mut clusters = std::mem::take(&mut self.clusters);
         clusters.clear();
         clusters.extend_from_slice(schedule.clusters(color));
-        clusters.sort_by_key(|&cluster| Reverse(schedule.constraints(cluster).len()));
+        clusters.sort_by_cached_key(|&cluster| {
+            let tets = schedule.constraints(cluster);
+            let corner = tets.first().map(|&tet| ingredients(tet).tet.particles[0]);
+            let place = corner.map(|corner| self.places.place(corner));
+            (Reverse(tets.len()), place)
+        });
         let mut filled = 0;
         for together in clusters.chunks(self.blocks.lanes) {
             let group = self.open(color, schedule.constraints(together[0]).len());
@@ -187,7 +197,7 @@ impl<R: Float> Layout<R> {
             self.blocks.active[block] |= 1 << lane;
             self.blocks.tets[slot] = tet;
             self.slots[tet as usize] = index(slot);
-            self.blocks.fill(slot, &ingredients(tet));
+            self.blocks.fill(slot, &ingredients(tet), &mut self.places);
             self.marked[tet as usize] = false;
         }
         self.groups.usages[color as usize].tets += index(tets.len());
@@ -206,6 +216,7 @@ impl<R: Float> Layout<R> {
             let slot = block * self.blocks.lanes + lane;
             // A particle that is there as long as any is.
             self.blocks.particles[slot] = [0; 4];
+            self.blocks.places[slot] = [0; 4];
             self.slots[self.blocks.tets[slot] as usize] = NONE;
             self.groups.usages[color as usize].tets -= 1;
         }

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::float::load;
+use crate::gauss_seidel::Sharing;
 use crate::layout::Ingredients;
 use crate::neo_hookean::TetConstraint;
 use crate::neo_hookean::tests::{point, rest};
@@ -72,7 +73,12 @@ impl<R: Float> Case<R> {
         let schedule = Schedule::new(&Clustering::none(count), &coloring);
         let mut layout = Layout::default();
         let lanes = gauss_seidel::lanes::<R>(level);
-        layout.update(&schedule, lanes, true, |t| {
+        let positions = || {
+            let positions = self.particles.iter();
+            let positions = positions.map(|v| DVec3::from_slice(&[0, 1, 2].map(|k| v[k].to_f64())));
+            positions.collect()
+        };
+        layout.update(&schedule, lanes, true, positions, |t| {
             let tet = self.tets[t as usize];
             Ingredients {
                 weights: tet.particles.map(|p| self.particles[p as usize][3]),
@@ -91,7 +97,7 @@ impl<R: Float> Case<R> {
         iterated: bool,
         multipliers: &[R::Atomic],
     ) -> Vec<R::Vector> {
-        self.paced(level, form, iterated, multipliers, &mut Pace::default())
+        self.paced(level, form, iterated, multipliers, &mut Sharing::default())
     }
 
     /// The positions after a pass on one thread or on several.
@@ -101,11 +107,13 @@ impl<R: Float> Case<R> {
         form: TetSolve,
         iterated: bool,
         multipliers: &[R::Atomic],
-        pace: &mut Pace,
+        sharing: &mut Sharing<R>,
     ) -> Vec<R::Vector> {
         let mut particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
+        let layout = self.layout(level);
         let pass = Pass {
-            layout: &self.layout(level),
+            layout: &layout,
+            corners: &layout.blocks.particles,
             positions: &[],
             multipliers,
             corrections: &[],
@@ -113,17 +121,17 @@ impl<R: Float> Case<R> {
             iterated,
             factors: self.factors,
         };
-        gauss_seidel::solve(level, form, &pass, &mut particles, pace);
+        gauss_seidel::solve(level, form, &pass, &mut particles, sharing);
         particles.iter().map(load::<R>).collect()
     }
 
     /// The velocities after a damping pass by the kernel.
     fn damped(&self, level: Level) -> Vec<R::Vector> {
-        self.damped_paced(level, &mut Pace::default())
+        self.damped_paced(level, &mut Sharing::default())
     }
 
     /// The velocities after a damping pass on one thread or on several.
-    fn damped_paced(&self, level: Level, pace: &mut Pace) -> Vec<R::Vector> {
+    fn damped_paced(&self, level: Level, sharing: &mut Sharing<R>) -> Vec<R::Vector> {
         let particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
         let weights = self.particles.iter().map(|v| v[3]);
         let mut velocities: Vec<_> = self
@@ -135,8 +143,10 @@ impl<R: Float> Case<R> {
                 R::particle([x, y, z, weight])
             })
             .collect();
+        let layout = self.layout(level);
         let pass = Pass {
-            layout: &self.layout(level),
+            layout: &layout,
+            corners: &layout.blocks.particles,
             positions: &particles,
             multipliers: &[],
             corrections: &[],
@@ -144,7 +154,7 @@ impl<R: Float> Case<R> {
             iterated: false,
             factors: self.factors,
         };
-        gauss_seidel::damp(level, &pass, &mut velocities, pace);
+        gauss_seidel::damp(level, &pass, &mut velocities, sharing);
         velocities.iter().map(load::<R>).collect()
     }
 
@@ -331,17 +341,17 @@ fn several_threads_and_kept_multipliers_change_no_bit() {
         for level in levels() {
             for form in [TetSolve::Split, TetSolve::Block, TetSolve::Sequential] {
                 let alone = case.by_lanes(level, form);
-                let mut pace = Pace::of_threads_that_gain();
-                let several = case.paced(level, form, false, &[], &mut pace);
+                let mut sharing = Sharing::new(Pace::of_threads_that_gain());
+                let several = case.paced(level, form, false, &[], &mut sharing);
                 assert_eq!(several, alone, "{level:?} {form:?}");
                 let kept = case.by_lanes_keeping(level, form, false, &none());
                 assert_eq!(kept, alone, "{level:?} {form:?}");
-                let mut pace = Pace::of_threads_that_gain();
-                let kept = case.paced(level, form, false, &none(), &mut pace);
+                let mut sharing = Sharing::new(Pace::of_threads_that_gain());
+                let kept = case.paced(level, form, false, &none(), &mut sharing);
                 assert_eq!(kept, alone, "{level:?} {form:?}");
             }
-            let mut pace = Pace::of_threads_that_gain();
-            assert_eq!(case.damped_paced(level, &mut pace), case.damped(level));
+            let mut sharing = Sharing::new(Pace::of_threads_that_gain());
+            assert_eq!(case.damped_paced(level, &mut sharing), case.damped(level));
         }
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build();
