@@ -61,7 +61,7 @@ pub(crate) fn keep_awake<T>(frame: impl FnOnce() -> T) -> T {
     };
     let end = End(Arc::new(AtomicBool::new(false)));
     let has_ended = Arc::clone(&end.0);
-    // Not part of a scope: nobody waits for a thread that is busy elsewhere and comes late.
+    // Not part of a scope, which would wait for a thread that is busy elsewhere and comes late.
     rayon::spawn_broadcast(move |_| look_for_work(&has_ended));
     frame()
 }
@@ -365,7 +365,7 @@ mod tests {
                 }
             });
         });
-        // Outside of a pool there is nobody to keep awake.
+        // Outside of a pool no thread is kept awake.
         assert!(!keep_awake(|| IN_FRAME.get()));
     }
 }

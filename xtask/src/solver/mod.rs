@@ -19,7 +19,7 @@ pub(crate) struct SolverArguments {
     /// Small bodies and few iterations: a minute instead of many. For tests; the figures mean nothing.
     #[arg(long)]
     quick: bool,
-    /// Take the liver of this folder (`liver_11k.vtk`) instead of a generated one.
+    /// Take the livers of this folder (`liver_11k.vtk`, `liver_89k.vtk`) instead of a generated one.
     #[arg(long, value_name = "DIR")]
     models: Option<PathBuf>,
     /// Only this table.
@@ -66,7 +66,11 @@ fn tables(arguments: &SolverArguments) -> anyhow::Result<String> {
     }
     if wanted(Part::Speed) {
         let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
-        parts.push(speed::speed(&mesh, arguments.quick)?);
+        parts.push(speed::speed(
+            &mesh,
+            arguments.models.as_deref(),
+            arguments.quick,
+        )?);
     }
     Ok(parts.join("\n"))
 }
