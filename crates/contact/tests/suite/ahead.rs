@@ -301,7 +301,16 @@ fn nothing_is_missed_where_vertices_are_searched_for_alone() {
             scene.update();
             let searched = scene.contacts.searched_vertices();
             some += u32::from(searched > 0 && searched < all);
-            let fresh = scene.searched_anew();
+            let mut fresh = scene.contacts.clone();
+            fresh.search_again();
+            fresh.update(&incise_contact::ContactState {
+                mesh: &scene.body,
+                pieces: &scene.pieces,
+                positions: &scene.positions,
+                velocities: &scene.velocities,
+                fixed: &scene.fixed,
+                frame_time: FRAME,
+            });
             let skin = fresh.settings().skin * fresh.mean_edge();
             for contact in fresh.faces() {
                 let [vertex, corners @ ..] = &contact.particles;

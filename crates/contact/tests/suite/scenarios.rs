@@ -669,7 +669,16 @@ fn kept_lists_are_complete() {
                 continue;
             }
             kept += 1;
-            let fresh = scene.searched_anew();
+            let mut fresh = scene.contacts.clone();
+            fresh.search_again();
+            fresh.update(&incise_contact::ContactState {
+                mesh: &scene.body,
+                pieces: &scene.pieces,
+                positions: &scene.positions,
+                velocities: &scene.velocities,
+                fixed: &scene.fixed,
+                frame_time: FRAME,
+            });
             let skin = fresh.settings().skin * fresh.mean_edge();
             for contact in fresh.faces() {
                 let [vertex, corner, ..] = contact.particles;

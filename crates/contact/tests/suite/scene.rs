@@ -97,21 +97,6 @@ impl Scene {
         self.contacts.update(&state)
     }
 
-    /// What a search for all vertices finds. The contacts of the scene stay as they are.
-    pub(crate) fn searched_anew(&self) -> ContactDetector {
-        let mut fresh = self.contacts.clone();
-        fresh.search_again();
-        fresh.update(&ContactState {
-            mesh: &self.body,
-            pieces: &self.pieces,
-            positions: &self.positions,
-            velocities: &self.velocities,
-            fixed: &self.fixed,
-            frame_time: self.frame_time,
-        });
-        fresh
-    }
-
     /// Into how many parts a frame is divided.
     pub(crate) fn intervals(&mut self) -> u32 {
         self.contacts.intervals(&ContactState {
