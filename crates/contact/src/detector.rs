@@ -5,24 +5,22 @@
 //! no search, are evaluated each frame. The solver takes the plain records and decides in each substep which of them
 //! act.
 //!
-//! How far the search looks is known for each vertex and triangle: a skin, and what the frame brings the two closer at
-//! their present velocities. So a fast corner of a sliver looks far, and what falls or bends beside it does not. Of the
-//! candidates, those are listed that the frame may bring together. What none of the particles involved can change is not
-//! listed unless it overlaps.
+//! Of the candidates, those are listed that the frame may bring together. How far to look ahead is known by vertex: the
+//! motion of a part as a whole towards others, and what the vertex moves beside it. So a fast corner of a sliver looks
+//! far, and what rests beside it does not. What none of the particles involved can change is not listed unless it overlaps.
 //!
-//! Vertices are searched for one by one, when the motion of the vertex or of a triangle near it has used up the skin.
-//! Motion is measured beside that of parts, the pieces of all bodies: a part that falls or turns as a whole does not
-//! approach itself, and two parts whose boxes are out of reach of each other do not matter to each other.
+//! What is near is known by parts: the pieces of all bodies. Two parts whose boxes are out of reach of each other do not
+//! matter to each other, however fast they part or pass, and a part that turns as a whole does not approach itself.
 //!
 //! The decision to search again depends on positions, velocities and frame time only, so results are the same for any
 //! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
 //! distance and face.
 //!
-//! Cost: an update without a search is three passes over the surface vertices, and one over the candidates and the
-//! twins. A search is a refit of the trees, a query for each vertex that is due and for each feature edge, and a short
-//! query for each other vertex, on all threads. A delta costs what the boundary lost and gained. The first search also
-//! looks for vertices that start inside of other parts, among all tets. The search after a cut is for all vertices; it
-//! builds a tree over the new triangles, and over all of them once these are more than a quarter.
+//! Cost: an update without a search is three passes over the surface vertices, and one over the candidates and the twins; a
+//! search is a refit of the trees and a query for each surface vertex and each feature edge, on all threads; a delta costs what the boundary lost and
+//! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
+//! cut builds a tree over the new triangles, and over all of them once these are more than a
+//! quarter.
 
 use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta, CuttableMesh};
@@ -30,19 +28,17 @@ use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
 use crate::ContactError;
-use crate::ahead::{Near, Reach};
 use crate::edges::{EdgeContact, FeatureEdges, turn};
 use crate::face::FaceContact;
 use crate::index::{NONE, index};
 use crate::normals::{Owner, PlacedTriangle, Shape};
 use crate::pairs::{FreshPairs, PairContact};
-use crate::parts::{Motion, Part};
+use crate::parts::Part;
 use crate::query::{Found, Query};
-use crate::reserve::Reserve;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};
-use crate::tree::{Box32, Item, TriangleTree};
+use crate::tree::{Box32, TriangleTree};
 use crate::walk::Barycentric;
 
 /// New triangles as a fraction of those in the main tree beyond which that is built again.
@@ -53,24 +49,13 @@ const PARALLEL: usize = 512;
 const SLID: f64 = 0.5;
 /// It has to have moved by this fraction of the skin at least: on a sliver half a barycentric coordinate is nothing.
 const SLID_SKIN: f64 = 0.5;
-/// A vertex inside that has gone deeper by this fraction of the skin is searched for again, before it gets out of reach.
-const DEEPER: f64 = 0.5;
+/// A vertex inside that has gone deeper by this fraction of the reach is searched for again, before it gets out of reach.
+const DEEPER: f64 = 0.25;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
 const BEYOND: f64 = 0.25;
 /// Candidates are listed that are apart by this fraction of the skin more than the frame may bring them together: what
 /// speeds up within the frame may come further.
 const SPARE: f64 = 0.5;
-/// The search looks ahead in time by so many times the distance by which a frame may bring surfaces together before it is
-/// divided: a few vertices may be faster.
-const FURTHER: f64 = 4.0;
-/// A frame is divided if more than this part of the vertices of a piece close in on what is near them by more than that
-/// distance,
-const FAST: f64 = 0.01;
-/// or parts near each other move by so many times the distance relative to each other as a whole: most of that may be
-/// sliding.
-const WHOLE: f64 = 2.0;
-/// Where more than this part of all vertices have moved out of their reserve, all are searched for.
-const MOST: f64 = 0.5;
 
 /// What an update changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -161,16 +146,17 @@ pub struct ContactDetector {
     features_are_due: bool,
     /// The vertices inside another part, ascending, each with the tet that contains it.
     inside: Vec<(ParticleId, TetId)>,
-    /// The vertices inside another part without a triangle near them, ascending, each with whether it has no way out.
-    deep: Vec<(ParticleId, bool)>,
-    /// How many vertices the last update searched for.
-    searched: usize,
+    deep: usize,
+    buried: usize,
     /// The surface vertices, ascending.
     vertices: Vec<u32>,
     /// The piece of each of them.
     parts: Vec<u32>,
-    reserve: Reserve,
-    /// Whether the next update has to search for all vertices.
+    /// Where they were at the last search.
+    searched_at: Vec<DVec3>,
+    /// How far the last search reached in m.
+    reach: f64,
+    /// Whether the next update has to search.
     search_is_due: bool,
     /// Whether the next search has to look for vertices inside of other parts everywhere. Later ones know which they
     /// are: a vertex gets inside through the outer tets, which the search looks at.
@@ -189,20 +175,8 @@ struct Room {
     last_edges: Vec<EdgeContact>,
     last_pairs: Vec<PairContact>,
     last_inside: Vec<(ParticleId, TetId)>,
-    last_candidates: Vec<FaceContact>,
-    last_sightings: Vec<Sighting>,
-    last_deep: Vec<(ParticleId, bool)>,
     /// By particle.
-    due: Vec<Due>,
-    /// By particle the way that it goes in the frame.
-    steps: Vec<DVec3>,
-    retired: Vec<u32>,
-    /// By piece how many vertices ask for two parts of a frame, and for four.
-    fast: Vec<[u32; 2]>,
-    /// The numbers of the surface vertices in the order of the triangles of the trees, in which those in a row look at the
-    /// same nodes; and the place of each in that order.
-    order: Vec<u32>,
-    place: Vec<u32>,
+    ahead: Vec<Ahead>,
     /// By piece.
     parts: Vec<Part>,
     /// The pieces in the order of their boxes along x.
@@ -241,11 +215,12 @@ impl ContactDetector {
             features: FeatureEdges::default(),
             features_are_due: true,
             inside: Vec::new(),
-            deep: Vec::new(),
-            searched: 0,
+            deep: 0,
+            buried: 0,
             vertices: Vec::new(),
             parts: Vec::new(),
-            reserve: Reserve::default(),
+            searched_at: Vec::new(),
+            reach: 0.0,
             search_is_due: true,
             location_is_due: true,
             room: Room::default(),
@@ -281,7 +256,6 @@ impl ContactDetector {
         self.search_is_due = true;
         self.location_is_due = true;
         self.inside.clear();
-        self.deep.clear();
         self.face_candidates.clear();
         self.sightings.clear();
         self.edge_candidates.clear();
@@ -361,13 +335,6 @@ impl ContactDetector {
             *tet = before(*tet);
             particle.index() < delta.particles_before && tet.index() < delta.tets_before
         });
-        // Those that are left are searched for.
-        self.face_candidates.clear();
-        self.sightings.clear();
-        self.deep.clear();
-        let is_left = |p: &u32| (*p as usize) < delta.particles_before;
-        self.edge_candidates
-            .retain(|contact| contact.particles.iter().all(is_left));
         self.fresh_is_due = true;
         self.features_are_due = true;
         self.search_is_due = true;
@@ -397,32 +364,30 @@ impl ContactDetector {
         if self.search_is_due {
             self.list_vertices(state);
         }
-        self.survey(state);
+        let moved = self.survey(state);
+        let skin = self.settings.skin * self.mean_edge;
+        let reach = skin + moved.margin + self.settings.thickness;
+
         let near = self.near(state);
         std::mem::swap(&mut self.pairs, &mut self.room.last_pairs);
-        let mut retired = std::mem::take(&mut self.room.retired);
-        retired.clear();
-        let near = Near {
-            steps: &self.room.steps,
-            ..near
-        };
-        self.fresh_pairs.evaluate(
-            &self.surface,
-            state.positions,
-            |[a, b], gap| near.of(&[a], &[b], gap),
-            |pair| retired.extend(pair),
-            &mut self.pairs,
-        );
-        let asked = self.ask(state, &retired);
-        self.room.retired = retired;
+        let ahead = &self.room.ahead;
+        let is_near = |[a, b]: [u32; 2], gap: f64| near.of(ahead, &[a], &[b], gap);
+        let evaluated =
+            self.fresh_pairs
+                .evaluate(&self.surface, state.positions, is_near, &mut self.pairs);
+        let searched = self.search_is_due
+            || evaluated.retired
+            || moved.needed > self.reach
+            || moved.needed.is_nan()
+            || self.has_slid(state);
         let mut update = ContactUpdate {
-            searched: asked.vertices,
+            searched,
             ..ContactUpdate::default()
         };
-        if asked.vertices {
-            self.search(state, asked);
-        }
-        if !asked.edges {
+        if searched {
+            self.reach = reach;
+            self.search(state);
+        } else {
             turn(&mut self.edge_candidates, state.positions);
         }
         self.list(state);
@@ -432,104 +397,25 @@ impl ContactDetector {
         update
     }
 
-    fn skin(&self) -> f64 {
-        self.settings.skin * self.mean_edge
-    }
-
-    /// How far a search looks.
-    fn reach(&self) -> Reach {
-        Reach {
-            still: self.skin() + self.settings.thickness,
-            limit: FURTHER * self.settings.reach * self.mean_edge,
-        }
-    }
-
-    /// What decides which contacts are listed, but for the steps.
+    /// What decides which contacts are near.
     fn near<'s>(&self, state: &ContactState<'s>) -> Near<'s> {
+        let skin = self.settings.skin * self.mean_edge;
         Near {
             fixed: state.fixed,
-            steps: &[],
-            reach: Reach {
-                still: SPARE * self.skin() + self.settings.thickness,
-                ..self.reach()
-            },
+            spare: SPARE * skin + self.settings.thickness,
+            limit: self.settings.reach * self.mean_edge,
         }
-    }
-
-    /// Notes what is due.
-    fn ask(&mut self, state: &ContactState<'_>, retired: &[u32]) -> Asked {
-        let mut due = std::mem::take(&mut self.room.due);
-        due.clear();
-        due.resize(state.positions.len(), Due::Nothing);
-        self.searched = 0;
-        let all = self.ask_for_moved(&mut due);
-        if !all {
-            let mut look = |p: u32| due[p as usize] = due[p as usize].max(Due::Search);
-            self.each_slid(state, &mut look);
-            retired.iter().copied().for_each(look);
-        }
-        let is_due = |of: Due| self.vertices.iter().any(|&p| due[p as usize] >= of);
-        let has_moved = is_due(Due::Moved);
-        let asked = Asked {
-            all,
-            vertices: self.search_is_due || is_due(Due::Search),
-            edges: self.search_is_due || has_moved || !retired.is_empty(),
-            has_moved: has_moved && !all,
-        };
-        self.room.due = due;
-        asked
-    }
-
-    /// Notes the vertices that have moved out of their reserve, which starts over for them; whether all are due.
-    fn ask_for_moved(&mut self, due: &mut [Due]) -> bool {
-        let skin = self.skin();
-        let parts = &self.room.parts;
-        let self_contact = self.settings.self_contact;
-        let is_asked = |part: usize| self_contact || parts[part].is_near;
-        let vertices = || {
-            let parts = self.parts.iter().map(|&part| part as usize);
-            parts.zip(&self.vertices).enumerate()
-        };
-        let mut moved = 0;
-        for (i, (part, &p)) in vertices().filter(|(_, (part, _))| is_asked(*part)) {
-            let is_used_up =
-                self.reserve.is_part_used_up(part, skin) || self.reserve.is_used_up(i, part, skin);
-            if self.search_is_due || is_used_up {
-                due[p as usize] = Due::Moved;
-                moved += 1;
-            }
-        }
-        let all = moved as f64 > MOST * self.vertices.len() as f64;
-        if all {
-            for (_, (_, &p)) in vertices().filter(|(_, (part, _))| is_asked(*part)) {
-                due[p as usize] = Due::Moved;
-            }
-        }
-        for (i, &p) in self.vertices.iter().enumerate() {
-            if due[p as usize] == Due::Moved {
-                self.reserve.renew(i);
-            }
-        }
-        for part in (0..parts.len()).filter(|&part| parts[part].body != NONE) {
-            if !is_asked(part) {
-                self.reserve.empty_part(part);
-            } else if all || self.search_is_due || self.reserve.is_part_used_up(part, skin) {
-                self.reserve.renew_part(part);
-            }
-        }
-        all || self.search_is_due
     }
 
     /// Lists the candidates that the frame may bring together.
     fn list(&mut self, state: &ContactState<'_>) {
         let near = self.near(state);
         let Room {
-            steps,
+            ahead,
             last_faces,
             last_edges,
             ..
         } = &mut self.room;
-        let near = Near { steps, ..near };
         std::mem::swap(&mut self.faces, last_faces);
         std::mem::swap(&mut self.edges, last_edges);
         self.faces.clear();
@@ -537,20 +423,19 @@ impl ContactDetector {
         let faces = self.face_candidates.iter().filter(|contact| {
             let [vertex, corners @ ..] = &contact.particles;
             let gap = contact.gap(state.positions);
-            near.of(std::slice::from_ref(vertex), corners, gap)
+            near.of(ahead, std::slice::from_ref(vertex), corners, gap)
         });
         self.faces.extend(faces);
         let edges = self.edge_candidates.iter().filter(|contact| {
             let (one, other) = contact.particles.split_at(2);
-            near.of(one, other, contact.separation(state.positions))
+            near.of(ahead, one, other, contact.separation(state.positions))
         });
         self.edges.extend(edges);
     }
 
     /// Into how many equal parts the frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
-    /// more than 1% of the vertices of a part close in on what is near them by more than [`ContactSettings::reach`] and the
-    /// skin, or if parts near each other move relative to each other as a whole by twice as much. Fewer vertices are not
-    /// worth the time: the search looks further for them. O(surface vertices + candidates + pieces²).
+    /// surfaces that may meet in the frame may approach each other by more than the search looks ahead. O(surface
+    /// vertices + pieces²).
     ///
     /// # Panics
     /// If there are fewer positions or velocities than particles, or a delta was left out.
@@ -559,72 +444,30 @@ impl ContactDetector {
         if self.search_is_due {
             self.list_vertices(state);
         }
+        self.fit_parts(state);
         let ahead = (self.settings.reach + self.settings.skin) * self.mean_edge;
-        let step = |p: u32| state.velocities[p as usize] * state.frame_time;
-        let places = |p: u32| [state.positions[p as usize]; 2];
-        let parts = &mut self.room.parts;
-        fit(parts, &self.parts, &self.vertices, &self.body_of, |_, p| {
-            (places(p), [step(p), DVec3::ZERO])
-        });
         let mut most = 0.0_f64;
         let parts = self.room.parts.iter().filter(|part| part.body != NONE);
         for (i, one) in parts.clone().enumerate() {
+            if self.settings.self_contact {
+                let [_, speed] = one.within();
+                most = most.max(speed * state.frame_time);
+            }
             for other in parts.clone().skip(i + 1) {
                 let may_touch =
                     one.body == other.body || self.settings.bodies.allow(one.body, other.body);
-                if !may_touch {
-                    continue;
-                }
-                let approach = one.approach(other, self.skin());
-                let around = one.bounds().widened(approach + self.skin());
-                if around.overlaps(other.bounds()) {
+                let approach = one.fastest(other) * state.frame_time;
+                let around = one.bounds.widened(approach + ahead);
+                if may_touch && around.overlaps(&other.bounds) {
                     most = most.max(approach);
                 }
             }
         }
-        let by_parts = match most {
-            approach if approach <= WHOLE * ahead => 1,
-            approach if approach <= 2.0 * WHOLE * ahead => 2,
+        match most {
+            approach if approach <= ahead => 1,
+            approach if approach <= 2.0 * ahead => 2,
             _ => 4,
-        };
-        by_parts.max(self.intervals_of_vertices(state, ahead))
-    }
-
-    /// Into how many parts a frame should be divided for what vertices are near.
-    fn intervals_of_vertices(&mut self, state: &ContactState<'_>, ahead: f64) -> u32 {
-        let Room {
-            parts, steps, fast, ..
-        } = &mut self.room;
-        steps.clear();
-        steps.extend(state.velocities.iter().map(|v| *v * state.frame_time));
-        fast.clear();
-        fast.resize(parts.len(), [0; 2]);
-        let mut candidates = &self.face_candidates[..];
-        for (&vertex, &part) in self.vertices.iter().zip(&self.parts) {
-            let own = candidates.partition_point(|contact| contact.particles[0] <= vertex);
-            let (these, others) = candidates.split_at(own);
-            candidates = others;
-            let most = these.iter().map(|contact| {
-                let normal = contact.normal_at(state.positions);
-                let [vertex, corners @ ..] = contact.particles.map(|p| steps[p as usize]);
-                let closing = corners.map(|corner| normal.dot(corner - vertex));
-                closing.into_iter().fold(0.0, f64::max)
-            });
-            let most = most.fold(0.0, f64::max);
-            let fast = &mut fast[part as usize];
-            fast[0] += u32::from(most > ahead);
-            fast[1] += u32::from(most > 2.0 * ahead);
         }
-        let mut intervals = 1;
-        for (part, &[twice, four]) in parts.iter().zip(&*fast) {
-            let few = FAST * f64::from(part.vertices);
-            if f64::from(four) > few {
-                intervals = 4;
-            } else if f64::from(twice) > few {
-                intervals = intervals.max(2);
-            }
-        }
-        intervals
     }
 
     /// The surface vertices and their pieces.
@@ -637,74 +480,105 @@ impl ContactDetector {
             self.parts
                 .push(triangle.map_or(0, |triangle| state.pieces.piece_of(triangle.tet)));
         }
-        self.reserve.clear();
+        self.searched_at.clear();
     }
 
-    /// Looks at all parts: which are near each other, and what they and their vertices have moved by.
-    fn survey(&mut self, state: &ContactState<'_>) {
-        let Reach { still, limit } = self.reach();
-        let widest = still + limit;
+    /// Finds the boxes and the motions of all parts.
+    fn fit_parts(&mut self, state: &ContactState<'_>) {
+        let parts = &mut self.room.parts;
+        let number = self.parts.iter().map(|&part| part as usize);
+        let motions = self.vertices.iter().enumerate().map(|(i, &vertex)| {
+            let x = state.positions[vertex as usize];
+            // Where a search is due there is nothing to compare with.
+            let moved = self
+                .searched_at
+                .get(i)
+                .map_or(DVec3::ZERO, |before| x - *before);
+            (x, [moved, state.velocities[vertex as usize]])
+        });
+        parts.clear();
+        parts.resize(number.clone().max().map_or(0, |most| most + 1), Part::EMPTY);
+        for ((part, &vertex), (x, moves)) in number.clone().zip(&self.vertices).zip(motions.clone())
+        {
+            parts[part].body = self.body_of[vertex as usize];
+            parts[part].add(x, moves);
+        }
+        parts.iter_mut().for_each(Part::fit);
+        for (part, (x, moves)) in number.zip(motions) {
+            parts[part].leave(x, moves);
+        }
+    }
+
+    /// Looks at all parts: how they have moved and may move towards those that they may touch and are near.
+    fn survey(&mut self, state: &ContactState<'_>) -> Moved {
+        self.fit_parts(state);
+        let limit = self.settings.reach * self.mean_edge;
+        let thickness = self.settings.thickness;
+        let widest = (self.settings.skin * self.mean_edge + limit + thickness).max(self.reach);
         let Room {
             parts,
             sorted,
-            steps,
+            ahead,
             ..
         } = &mut self.room;
-        steps.clear();
-        steps.extend(state.velocities.iter().map(|v| *v * state.frame_time));
-        let places = |p: u32| {
-            let x = state.positions[p as usize];
-            [x, x + steps[p as usize]]
-        };
-        let reserve = &mut self.reserve;
-        fit(parts, &self.parts, &self.vertices, &self.body_of, |i, p| {
-            (places(p), reserve.moved(i, places(p)))
-        });
         sorted.clear();
         sorted.extend((0..index(parts.len())).filter(|&p| parts[p as usize].body != NONE));
-        let low = |p: &u32| parts[*p as usize].bounds().low.x;
+        let low = |p: &u32| parts[*p as usize].bounds.low.x;
         sorted.sort_unstable_by(|p, q| low(p).total_cmp(&low(q)).then(p.cmp(q)));
 
-        reserve.begin_pairs(parts.len());
+        let mut all = Moved::default();
+        let mut meet = |[moved, speed]: [f64; 2], turned: f64| {
+            let margin = (speed * state.frame_time).min(limit);
+            let needed = moved + margin + thickness + turned * (margin + thickness);
+            all.margin = all.margin.max(margin);
+            // What is no number asks for a search.
+            all.needed = if needed.is_nan() {
+                needed
+            } else {
+                all.needed.max(needed)
+            };
+        };
         for i in 0..sorted.len() {
-            let first = sorted[i] as usize;
-            let one = parts[first];
-            let around = one.bounds().widened(widest);
+            let one = parts[sorted[i] as usize];
+            if self.settings.self_contact {
+                meet(one.within(), one.turned());
+            }
+            let around = one.bounds.widened(widest);
             for &second in &sorted[i + 1..] {
-                let second = second as usize;
-                let other = parts[second];
-                if other.bounds().low.x > around.high.x {
+                let other = &mut parts[second as usize];
+                if other.bounds.low.x > around.high.x {
                     break;
                 }
                 let may_touch =
                     one.body == other.body || self.settings.bodies.allow(one.body, other.body);
-                if may_touch && around.overlaps(other.bounds()) {
-                    let ahead = one.fastest(&other).min(limit);
-                    reserve.note_pair([first, second], [&one, &other], still + ahead, ahead);
-                    parts[first].is_near = true;
-                    parts[second].is_near = true;
+                if may_touch && around.overlaps(&other.bounds) {
+                    meet(one.towards(other, widest), other.turned());
+                    let approach = one.approach(other, widest);
+                    other.meet(approach);
+                    parts[sorted[i] as usize].meet(approach);
                 }
             }
         }
-        reserve.end_pairs();
-        for (i, (&part, &vertex)) in self.parts.iter().zip(&self.vertices).enumerate() {
-            reserve.note(i, &parts[part as usize], places(vertex));
+        let most = |way: f64| if way <= limit { way } else { limit };
+        ahead.resize(state.positions.len(), Ahead::default());
+        for (&part, &vertex) in self.parts.iter().zip(&self.vertices) {
+            let p = vertex as usize;
+            let part = &parts[part as usize];
+            let own = part.beside(state.positions[p], state.velocities[p]) * state.frame_time;
+            ahead[p] = Ahead {
+                own: most(own),
+                towards_others: most(part.approach_of_others() * state.frame_time),
+            };
         }
+        all
     }
 
-    /// Calls `look` with each vertex in contact that is about to leave its triangle or has gone deeper.
-    fn each_slid(&self, state: &ContactState<'_>, mut look: impl FnMut(u32)) {
-        let skin = self.skin();
+    /// Whether a vertex in contact is about to leave its triangle or has gone deeper.
+    fn has_slid(&self, state: &ContactState<'_>) -> bool {
+        let skin = self.settings.skin * self.mean_edge;
         let close = 0.5 * skin + self.settings.thickness;
-        for (contact, sighting) in self.face_candidates.iter().zip(&self.sightings) {
-            let gap = contact.gap(state.positions);
-            if gap >= close {
-                continue;
-            }
-            if gap < 0.0 && gap < sighting.gap - DEEPER * skin {
-                look(contact.particles[0]);
-                continue;
-            }
+        let mut candidates = self.face_candidates.iter().zip(&self.sightings);
+        candidates.any(|(contact, sighting)| {
             let [_, second, third] = beneath(contact, state.positions);
             let [before2, before3] = sighting.weights;
             let first = 1.0 - second - third;
@@ -719,19 +593,20 @@ impl ContactDetector {
             let is_beyond = beyond(first, 1.0 - before2 - before3)
                 || beyond(second, before2)
                 || beyond(third, before3);
-            if !(has_slid || is_beyond) {
-                continue;
+            let gap = contact.gap(state.positions);
+            let is_deeper = gap < 0.0 && gap < sighting.gap - DEEPER * self.reach;
+            if is_deeper {
+                return true;
             }
             let [_, x1, x2, x3] = contact.particles.map(|p| state.positions[p as usize]);
             let way = (x2 - x1) * slid[0] + (x3 - x1) * slid[1];
-            if way.length() > SLID_SKIN * skin || !way.is_finite() {
-                look(contact.particles[0]);
-            }
-        }
+            let has_moved = way.length() > SLID_SKIN * skin || !way.is_finite();
+            (has_slid || is_beyond) && has_moved && gap < close
+        })
     }
 
-    /// Finds all candidates that were asked for.
-    fn search(&mut self, state: &ContactState<'_>, asked: Asked) {
+    /// Finds all candidates.
+    fn search(&mut self, state: &ContactState<'_>) {
         self.prepare_slots(state);
         self.sync_trees(state);
         if self.features_are_due {
@@ -739,36 +614,20 @@ impl ContactDetector {
             self.features.list(&self.surface, rest);
             self.features_are_due = false;
         }
-        if self.search_is_due || self.room.order.len() != self.vertices.len() {
-            self.order_vertices();
-        }
-        self.query(state, asked);
+        self.query(state);
         self.collect(state);
         self.search_is_due = false;
     }
 
     /// Boxes and normals of the triangles at the present positions.
     fn prepare_slots(&mut self, state: &ContactState<'_>) {
-        let Room {
-            boxes,
-            placed,
-            steps,
-            due,
-            ..
-        } = &mut self.room;
+        let Room { boxes, placed, .. } = &mut self.room;
         let count = self.surface.slot_count();
         boxes.resize(count, Box32::EMPTY);
         placed.resize(count, PlacedTriangle::default());
         let (surface, body_of) = (&self.surface, &self.body_of);
         let prepare = |(slot, (bounds, placed)): (usize, (&mut Box32, &mut PlacedTriangle))| {
             (*bounds, *placed) = prepared(surface, body_of, state, index(slot));
-            let corners = surface.triangle(index(slot)).particles.map(|p| p.index());
-            let steps = corners.map(|p| steps.get(p).copied().unwrap_or_default());
-            if placed.normal == DVec3::ZERO {
-                placed.tet = Box32::EMPTY;
-            }
-            placed.steps = Box32::around(&Bounds::around(steps));
-            placed.is_marked = corners.iter().any(|&p| due.get(p) == Some(&Due::Moved));
         };
         if count < 2 * PARALLEL {
             let slots = boxes.iter_mut().zip(placed).enumerate();
@@ -790,62 +649,32 @@ impl ContactDetector {
             self.features_are_due = true;
             self.main_slots = self.surface.slot_count();
             let Room { boxes, placed, .. } = &self.room;
-            let (item_of, part_of) = by_slot(placed);
+            let (normal_of, part_of) = by_slot(placed);
             let all = 0..index(self.main_slots);
-            self.main.build(all, boxes, item_of, part_of);
+            self.main.build(all, boxes, normal_of, part_of);
             self.fresh.clear();
             self.fresh_is_due = false;
             return;
         }
         let Room { boxes, placed, .. } = &self.room;
-        let (item_of, part_of) = by_slot(placed);
-        self.main.refit(boxes, item_of);
+        let (normal_of, part_of) = by_slot(placed);
+        self.main.refit(boxes, normal_of);
         if self.fresh_is_due {
             let new = index(self.main_slots)..index(slots);
             let alive = new.filter(|&slot| self.surface.is_alive(slot));
-            self.fresh.build(alive, boxes, item_of, part_of);
+            self.fresh.build(alive, boxes, normal_of, part_of);
             self.fresh_is_due = false;
         } else {
-            self.fresh.refit(boxes, item_of);
-        }
-    }
-
-    /// Orders the vertices by the triangles of the trees.
-    fn order_vertices(&mut self) {
-        let Room { order, place, .. } = &mut self.room;
-        // By slot the place of the triangle.
-        place.clear();
-        place.resize(self.surface.slot_count(), NONE);
-        let slots = [&self.main, &self.fresh]
-            .into_iter()
-            .flat_map(TriangleTree::order);
-        for (at, &slot) in (0..).zip(slots) {
-            place[slot as usize] = at;
-        }
-        order.clear();
-        order.extend(0..index(self.vertices.len()));
-        order.sort_unstable_by_key(|&i| {
-            let vertex = ParticleId(self.vertices[i as usize]);
-            let first = self.surface.corners(vertex).next();
-            (first.map(|(slot, _)| place[slot as usize]), i)
-        });
-        place.clear();
-        place.resize(order.len(), 0);
-        for (at, &i) in (0..).zip(&*order) {
-            place[i as usize] = at;
+            self.fresh.refit(boxes, normal_of);
         }
     }
 
     /// Searches for each vertex and each feature edge.
-    fn query(&mut self, state: &ContactState<'_>, asked: Asked) {
-        let reach = self.reach();
+    fn query(&mut self, state: &ContactState<'_>) {
         let Room {
             placed,
             found,
             parts,
-            steps,
-            due,
-            order,
             ..
         } = &mut self.room;
         let query = Query {
@@ -859,8 +688,7 @@ impl ContactDetector {
             trees: [&self.main, &self.fresh],
             pairs: &self.fresh_pairs,
             body_of: &self.body_of,
-            steps,
-            reach,
+            reach: self.reach,
             mean_edge: self.mean_edge,
         };
         let self_contact = self.settings.self_contact;
@@ -878,86 +706,52 @@ impl ContactDetector {
             self.location_is_due = false;
         }
         let inside = &self.inside;
-        let (vertices, parts) = (&self.vertices, &self.parts);
-        let ask = |(&i, found): (&u32, &mut Found)| {
-            if !is_asked(parts[i as usize]) {
-                found.clear();
-                return;
-            }
-            let vertex = ParticleId(vertices[i as usize]);
-            let is_due = asked.all || due[vertex.index()] != Due::Nothing;
-            found.is_kept = !(is_due || asked.has_moved && query.meets_marked(vertex));
-            if !found.is_kept {
+        let ask = |((&vertex, &part), found): ((&u32, &u32), &mut Found)| {
+            if is_asked(part) {
+                let vertex = ParticleId(vertex);
                 let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
                 query.vertex(vertex, was_inside.ok().map(|i| inside[i].1), found);
+            } else {
+                found.clear();
             }
         };
-        found.resize(vertices.len(), Found::NOTHING);
+        found.resize(self.vertices.len(), Found::NOTHING);
         if found.len() < PARALLEL {
-            order.iter().zip(found).for_each(ask);
+            let vertices = self.vertices.iter().zip(&self.parts);
+            vertices.zip(found).for_each(ask);
         } else {
-            let places = order.par_iter().zip(found);
-            places.with_min_len(PARALLEL / 4).for_each(ask);
+            let vertices = self.vertices.par_iter().zip(&self.parts).zip(found);
+            vertices.with_min_len(PARALLEL / 4).for_each(ask);
         }
-        if asked.edges {
-            self.features.search(&query, &mut self.edge_candidates);
-        }
+        self.features.search(&query, &mut self.edge_candidates);
     }
 
     /// Makes lists of what was found for the vertices.
     fn collect(&mut self, state: &ContactState<'_>) {
         let Room {
-            found,
-            last_inside,
-            last_candidates,
-            last_sightings,
-            last_deep,
-            place,
-            ..
+            found, last_inside, ..
         } = &mut self.room;
         std::mem::swap(&mut self.inside, last_inside);
-        std::mem::swap(&mut self.face_candidates, last_candidates);
-        std::mem::swap(&mut self.sightings, last_sightings);
         self.face_candidates.clear();
         self.inside.clear();
         self.sightings.clear();
-        std::mem::swap(&mut self.deep, last_deep);
-        self.deep.clear();
-        let (mut candidates, mut sightings) = (&last_candidates[..], &last_sightings[..]);
-        let mut inside = &last_inside[..];
-        for (&vertex, &place) in self.vertices.iter().zip(&*place) {
-            let found = &found[place as usize];
-            let known = candidates.partition_point(|contact| contact.particles[0] <= vertex);
-            let first = candidates.partition_point(|contact| contact.particles[0] < vertex);
-            let was_inside = inside.partition_point(|(p, _)| p.0 < vertex);
-            inside = &inside[was_inside..];
-            if found.is_kept {
-                self.face_candidates.extend(&candidates[first..known]);
-                self.sightings.extend(&sightings[first..known]);
-                self.inside
-                    .extend(inside.first().filter(|(p, _)| p.0 == vertex));
-                let was_deep = last_deep.binary_search_by_key(&ParticleId(vertex), |deep| deep.0);
-                self.deep.extend(was_deep.ok().map(|i| last_deep[i]));
-            } else {
-                self.searched += usize::from(found.is_searched);
-                self.face_candidates.extend_from_slice(found.contacts());
-                self.sightings
-                    .extend(found.contacts().iter().map(|contact| {
-                        let [_, second, third] = beneath(contact, state.positions);
-                        Sighting {
-                            weights: [second, third],
-                            gap: contact.gap(state.positions),
-                        }
-                    }));
-                if found.inside != NONE {
-                    self.inside.push((ParticleId(vertex), TetId(found.inside)));
-                }
-                if found.is_deep {
-                    self.deep.push((ParticleId(vertex), found.is_buried));
-                }
+        self.searched_at.clear();
+        (self.deep, self.buried) = (0, 0);
+        for (&vertex, found) in self.vertices.iter().zip(found) {
+            self.searched_at.push(state.positions[vertex as usize]);
+            self.face_candidates.extend_from_slice(found.contacts());
+            if found.inside != NONE {
+                self.inside.push((ParticleId(vertex), TetId(found.inside)));
             }
-            candidates = &candidates[known..];
-            sightings = &sightings[known..];
+            self.deep += usize::from(found.is_deep);
+            self.buried += usize::from(found.is_buried);
+        }
+        for contact in &self.face_candidates {
+            let [_, second, third] = beneath(contact, state.positions);
+            self.sightings.push(Sighting {
+                weights: [second, third],
+                gap: contact.gap(state.positions),
+            });
         }
     }
 
@@ -1003,26 +797,26 @@ impl ContactDetector {
     /// them, at the last search.
     #[must_use]
     pub fn deep(&self) -> usize {
-        self.deep.len()
-    }
-
-    /// How many vertices the last update searched for.
-    #[must_use]
-    pub fn searched_vertices(&self) -> usize {
-        self.searched
+        self.deep
     }
 
     /// How many of the deep vertices have no way out within reach of the search, so that nothing pushes them out: a
     /// piece that was swallowed as a whole.
     #[must_use]
     pub fn buried(&self) -> usize {
-        self.deep.iter().filter(|(_, is_buried)| *is_buried).count()
+        self.buried
     }
 
     /// The mean edge of the surface at rest in m, as it was when the search tree was built over all triangles.
     #[must_use]
     pub fn mean_edge(&self) -> f64 {
         self.mean_edge
+    }
+
+    /// How far the last search reached in m.
+    #[must_use]
+    pub fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// The surface.
@@ -1079,57 +873,55 @@ impl ContactDetector {
     }
 }
 
-/// What has to be done for a vertex.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-enum Due {
-    Nothing,
-    /// It is searched for.
-    Search,
-    /// And so is all that is near its triangles.
-    Moved,
+/// How far a vertex may move in a frame, in m, each at most what the search looks ahead.
+#[derive(Clone, Copy, Debug, Default)]
+struct Ahead {
+    /// Beside the motion of its part as a whole.
+    own: f64,
+    /// By that motion, towards other parts near it.
+    towards_others: f64,
 }
 
-/// What a search is for.
-#[derive(Clone, Copy, Debug)]
-struct Asked {
-    /// All vertices.
-    all: bool,
-    /// Any vertex.
-    vertices: bool,
-    edges: bool,
-    /// Whether vertices near triangles that have moved are searched for besides those that are due.
-    has_moved: bool,
+/// Decides which contacts a frame may bring together.
+#[derive(Clone, Copy)]
+struct Near<'a> {
+    fixed: &'a [bool],
+    /// How far in m they may be apart beyond what the motion of the frame brings them together.
+    spare: f64,
+    /// The most in m that the search looks ahead.
+    limit: f64,
 }
 
-/// Fits the motions of all parts; `motion` gives the places of a surface vertex by its number and its particle, and what
-/// it has moved by.
-fn fit(
-    parts: &mut Vec<Part>,
-    part_of: &[u32],
-    vertices: &[u32],
-    body_of: &[u32],
-    motion: impl Fn(usize, u32) -> ([DVec3; 2], [DVec3; 2]),
-) {
-    let number = part_of.iter().map(|&part| part as usize);
-    parts.clear();
-    parts.resize(number.clone().max().map_or(0, |most| most + 1), Part::EMPTY);
-    for (i, (part, &vertex)) in number.zip(vertices).enumerate() {
-        let part = &mut parts[part];
-        part.body = body_of[vertex as usize];
-        part.vertices += 1;
-        let (places, moved) = motion(i, vertex);
-        let step = places[1] - places[0];
-        part.steps = part.steps.union(Bounds::around([step]));
-        for (motion, (x, by)) in part.motions.iter_mut().zip(places.into_iter().zip(moved)) {
-            motion.add(x, by);
+impl Near<'_> {
+    /// Whether the particles of one side may meet those of the other in the frame, and one of them can move. An overlap is
+    /// near in any case, so that reports tell of one that nothing can part.
+    fn of(&self, ahead: &[Ahead], one: &[u32], other: &[u32], gap: f64) -> bool {
+        let is_fixed = |p: &u32| self.fixed.get(*p as usize).copied().unwrap_or_default();
+        if one.iter().chain(other).all(is_fixed) {
+            return gap < 0.0;
         }
+        let most = |of: &[u32]| {
+            let own = of.iter().map(|&p| ahead[p as usize].own);
+            own.fold(0.0, f64::max)
+        };
+        let towards = ahead[one[0] as usize].towards_others;
+        // What is no number is kept.
+        let is_apart = gap > self.spare + (most(one) + most(other) + towards).min(self.limit);
+        !is_apart
     }
-    let motions = parts.iter_mut().flat_map(|part| &mut part.motions);
-    motions.for_each(Motion::fit);
+}
+
+/// How parts that are near each other move, see [`ContactDetector::survey`].
+#[derive(Clone, Copy, Default)]
+struct Moved {
+    /// How much closer two of them may come in the frame in m, at most what the search looks ahead.
+    margin: f64,
+    /// How far a search must have reached in m to know of all that may come into contact in the frame.
+    needed: f64,
 }
 
 /// The box of a triangle and the triangle at the present positions; the empty box and no normal if it must not be touched.
-/// The tet behind it has a box of its own, so that the search also says which tets may contain a vertex.
+/// The box is that of the tet behind it, so that the search also says which tets may contain a vertex.
 fn prepared(
     surface: &ContactSurface,
     body_of: &[u32],
@@ -1141,13 +933,13 @@ fn prepared(
     }
     let BoundaryTriangle { tet, particles, .. } = *surface.triangle(slot);
     let mut placed = PlacedTriangle {
+        normal: DVec3::ZERO,
         area: surface.area(slot, state.positions),
         corners: particles.map(|p| state.positions[p.index()]),
         owner: Owner {
             body: body_of[particles[0].index()],
             piece: state.pieces.piece_of(tet),
         },
-        ..PlacedTriangle::default()
     };
     let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
     let squared = placed.area.length_squared();
@@ -1155,28 +947,19 @@ fn prepared(
         return (Box32::EMPTY, placed);
     }
     placed.normal = placed.area / squared.sqrt();
-    placed.tet = Box32::around(&Bounds::around(corners));
-    (Box32::around(&Bounds::around(placed.corners)), placed)
+    (Box32::around(&Bounds::around(corners)), placed)
 }
 
-/// What a tree asks of triangles, by slot: what it takes over and their pieces.
+/// What a tree asks of triangles, by slot: their normals and their pieces.
 fn by_slot(
     placed: &[PlacedTriangle],
 ) -> (
-    impl Fn(u32) -> Item + Copy + '_,
+    impl Fn(u32) -> DVec3 + Copy + '_,
     impl Fn(u32) -> u32 + Copy + '_,
 ) {
-    let item_of = |slot: u32| {
-        let placed = &placed[slot as usize];
-        Item {
-            normal: placed.normal,
-            tet: placed.tet,
-            steps: placed.steps,
-            is_marked: placed.is_marked,
-        }
-    };
+    let normal_of = |slot: u32| placed[slot as usize].normal;
     let part_of = |slot: u32| placed[slot as usize].owner.piece;
-    (item_of, part_of)
+    (normal_of, part_of)
 }
 
 /// A tree over all tets that are not flat or inverted, by their numbers. O(n log n).
@@ -1192,7 +975,7 @@ fn tree_of_tets(state: &ContactState<'_>) -> TriangleTree {
     });
     let boxes: Vec<Box32> = boxes.collect();
     let mut tree = TriangleTree::default();
-    tree.build(0..index(boxes.len()), &boxes, |_| Item::PLAIN, |_| 0);
+    tree.build(0..index(boxes.len()), &boxes, |_| DVec3::ZERO, |_| 0);
     tree
 }
 

@@ -5,10 +5,9 @@
 //! 1. the vertex is no corner of the triangle, and no live pair of a fresh cut says the same ([`crate::FreshPairs`]);
 //! 2. their bodies may touch;
 //! 3. their sides face each other;
-//! 4. the closest point of the triangle is within reach, which grows with the speed at which the two may approach, and is
-//!    a local minimum of the distance to the surface: on an edge or a vertex no triangle around it is closer. So a flat or
-//!    convex surface is touched once and a concave corner by each of its walls. One triangle stands for all those around
-//!    the edge or the vertex: the one that faces most;
+//! 4. the closest point of the triangle is within reach and is a local minimum of the distance to the surface: on an
+//!    edge or a vertex no triangle around it is closer. So a flat or convex surface is touched once and a concave corner
+//!    by each of its walls. One triangle stands for all those around the edge or the vertex: the one that faces most;
 //! 5. outside, one of the nearest three. Inside, of those that it does not lie behind at rest, the nearest from which a
 //!    way through tets leads to the vertex without meeting one of the vertex's own tets, if its depth is less than half
 //!    of the thickness there.
@@ -19,18 +18,17 @@
 //! Sources: J. A. Bærentzen and H. Aanæs 2005 (sides); H. Chen, E. Diaz, C. Yuksel 2023 (valid ways). Cost: a search in
 //! the tree, and for each triangle found a few dozen operations.
 
-use glam::{DVec3, Vec4};
+use glam::{DVec3, Vec3};
 use incise_cutting::FaceTag;
 use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest_on_triangle};
 
-use crate::ahead::{Lookout, Reach, approach};
 use crate::face::{FaceContact, Meeting, face_contact};
 use crate::index::NONE;
 use crate::normals::{Owner, Shape};
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
-use crate::tree::{Around, Box32, Leaf, TriangleTree};
+use crate::tree::{Box32, TriangleTree};
 use crate::walk::{Barycentric, walk};
 
 /// Sides face each other where the dot product of their unit normals is below this.
@@ -62,9 +60,6 @@ const DEEP_TETS: usize = 64;
 pub(crate) struct Found {
     contacts: [FaceContact; OUTSIDE + 1],
     count: usize,
-    /// Whether nothing was searched for, and what is known stays.
-    pub(crate) is_kept: bool,
-    pub(crate) is_searched: bool,
     /// A tet of another part that contains it; [`NONE`] if there is none.
     pub(crate) inside: u32,
     /// Whether no triangle near it says how it got there.
@@ -81,8 +76,6 @@ impl Found {
             limit: None,
         }; OUTSIDE + 1],
         count: 0,
-        is_kept: false,
-        is_searched: false,
         inside: NONE,
         is_deep: false,
         is_buried: false,
@@ -90,8 +83,6 @@ impl Found {
 
     pub(crate) fn clear(&mut self) {
         self.count = 0;
-        self.is_kept = false;
-        self.is_searched = false;
         self.inside = NONE;
         self.is_deep = false;
         self.is_buried = false;
@@ -167,7 +158,7 @@ impl<const N: usize> Nearest<N> {
 /// The outward normals of a vertex, one for each tag around it.
 struct VertexNormals {
     normals: [(FaceTag, DVec3); Self::MOST],
-    single: [Vec4; Self::MOST],
+    single: [Vec3; Self::MOST],
     count: usize,
 }
 
@@ -178,7 +169,7 @@ impl VertexNormals {
     fn new(shape: &Shape<'_>, vertex: ParticleId) -> Self {
         let mut this = Self {
             normals: [(FaceTag::Outer, DVec3::ZERO); Self::MOST],
-            single: [Vec4::ZERO; Self::MOST],
+            single: [Vec3::ZERO; Self::MOST],
             count: 0,
         };
         for (slot, _) in shape.surface.corners(vertex) {
@@ -194,7 +185,7 @@ impl VertexNormals {
         for k in 0..this.count {
             let normal = &mut this.normals[k].1;
             *normal = normal.normalize_or_zero();
-            this.single[k] = normal.extend(0.0).as_vec4();
+            this.single[k] = normal.as_vec3();
         }
         this
     }
@@ -210,7 +201,7 @@ impl VertexNormals {
 
     /// Whether a triangle does not face the vertex for sure, whatever rounding does; cheap.
     #[inline]
-    fn turn_away(&self, normal: Vec4) -> bool {
+    fn turn_away(&self, normal: Vec3) -> bool {
         let mut normals = self.single[..self.count].iter();
         self.count > 0 && normals.all(|n| n.dot(normal) >= FACING_SINGLE)
     }
@@ -218,7 +209,7 @@ impl VertexNormals {
     /// Whether no triangle faces the vertex whose normal is in a box.
     #[inline]
     fn all_turn_away(&self, normals: &Box32) -> bool {
-        let (low, high) = (normals.low(), normals.high());
+        let (low, high) = (Vec3::from(normals.low), Vec3::from(normals.high));
         let mut own = self.single[..self.count].iter();
         // The least dot product with a vector of the box.
         self.count > 0 && own.all(|&n| (n * low).min(n * high).element_sum() >= FACING_SINGLE)
@@ -248,10 +239,8 @@ pub(crate) struct Query<'a> {
     pub(crate) trees: [&'a TriangleTree; 2],
     pub(crate) pairs: &'a FreshPairs,
     pub(crate) body_of: &'a [u32],
-    /// By particle the way that it goes in the frame.
-    pub(crate) steps: &'a [DVec3],
-    /// How far away a triangle may be.
-    pub(crate) reach: Reach,
+    /// How far away a triangle may be in m.
+    pub(crate) reach: f64,
     /// The mean edge of the surface.
     pub(crate) mean_edge: f64,
 }
@@ -300,7 +289,6 @@ impl Query<'_> {
     /// Writes what `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
     pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>, found: &mut Found) {
         found.clear();
-        found.is_searched = true;
         let normals = VertexNormals::new(&self.shape, id);
         let Some(vertex) = self.vertex_of(id, &normals) else {
             return;
@@ -309,21 +297,19 @@ impl Query<'_> {
         let mut outside = Nearest::<OUTSIDE>::EMPTY;
         let mut inside = Nearest::<TRIES>::EMPTY;
         let mut containing = NONE;
-        let lookout = self.lookout(&vertex);
-        let behind = Box32::around(&Bounds::around([vertex.behind]));
+        let around = Bounds::around([x]).widened(self.reach);
+        let wanted = Box32::around(&around);
         for tree in self.trees {
             // What is unsound has an empty box.
-            let is_wanted = |around: &Around| {
-                (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
-                    || around.tets.overlaps(&behind)
+            let is_wanted = |bounds: &Box32, around: &Box32| {
+                !normals.all_turn_away(around) || bounds.contains(vertex.behind)
             };
-            tree.search_where(is_wanted, |leaf| {
+            tree.search_where(&wanted, is_wanted, |leaf| {
                 let slot = leaf.number;
-                let is_near =
-                    !normals.turn_away(leaf.normal) && lookout.reaches(&leaf.bounds, &leaf.steps);
-                let contains = leaf.tet.overlaps(&behind);
-                if !(is_near || contains) || !self.may_touch(&vertex, slot) {
-                    return true;
+                let contains = leaf.bounds.contains(vertex.behind);
+                let turns_away = normals.turn_away(leaf.normal);
+                if (turns_away && !contains) || !self.may_touch(&vertex, slot) {
+                    return;
                 }
                 if contains {
                     let tet = self.shape.triangle(slot).tet;
@@ -331,18 +317,16 @@ impl Query<'_> {
                         containing = containing.min(tet.0);
                     }
                 }
-                if !is_near {
-                    return true;
+                if turns_away {
+                    return;
                 }
-                let most = f64::from(lookout.reach(&leaf.steps));
-                if let Some(near) = self.near(&vertex, slot, most) {
+                if let Some(near) = self.near(&vertex, slot) {
                     if !near.is_inside {
                         outside.insert(near);
                     } else if !self.is_as_at_rest(&vertex, near.slot, near.distance) {
                         inside.insert(near);
                     }
                 }
-                true
             });
         }
         for near in outside.iter() {
@@ -367,73 +351,6 @@ impl Query<'_> {
                 None => found.is_buried = true,
             }
         }
-    }
-
-    /// Around a vertex.
-    fn lookout(&self, vertex: &Vertex<'_>) -> Lookout {
-        let of = |x: DVec3| Box32::around(&Bounds::around([x]));
-        let step = self.steps[vertex.id.index()];
-        Lookout::new(&of(vertex.x), &of(step), &self.reach)
-    }
-
-    /// Whether a marked triangle that faces a vertex is within its reach.
-    pub(crate) fn meets_marked(&self, id: ParticleId) -> bool {
-        let normals = VertexNormals::new(&self.shape, id);
-        let Some(vertex) = self.vertex_of(id, &normals) else {
-            return false;
-        };
-        let lookout = self.lookout(&vertex);
-        let is_wanted = |around: &Around| {
-            around.is_marked
-                && lookout.reaches_node(around)
-                && !normals.all_turn_away(&around.normals)
-        };
-        let misses = |leaf: &Leaf| {
-            let is_met = leaf.is_marked
-                && lookout.reaches(&leaf.bounds, &leaf.steps)
-                && !normals.turn_away(leaf.normal)
-                && self.may_touch(&vertex, leaf.number)
-                && {
-                    let facing = normals.facing(self.shape.normal(leaf.number));
-                    facing < FACING || !facing.is_finite()
-                }
-                && {
-                    let most = f64::from(lookout.reach(&leaf.steps));
-                    self.within_reach(&vertex, leaf.number, most).is_some()
-                };
-            !is_met
-        };
-        let mut trees = self.trees.into_iter();
-        !trees.all(|tree| tree.search_where(is_wanted, misses))
-    }
-
-    /// How far away a triangle may be for a vertex.
-    fn reach_of(&self, vertex: &Vertex<'_>, slot: u32) -> f64 {
-        let corners = self.shape.triangle(slot).particles.map(|p| p.0);
-        self.reach
-            .of(approach(self.steps, &[vertex.id.0], &corners))
-    }
-
-    /// The point of a triangle that is closest to a vertex, with its distance, if it is within reach, which is at most
-    /// `most`.
-    #[inline]
-    fn within_reach(
-        &self,
-        vertex: &Vertex<'_>,
-        slot: u32,
-        most: f64,
-    ) -> Option<(ClosestPoint, f64)> {
-        let corners = self.shape.corners(slot);
-        // The plane is no further than the triangle.
-        let from = vertex.x - corners[0];
-        if self.shape.normal(slot).dot(from).abs() > most * (1.0 + ROUNDING) {
-            return None;
-        }
-        let closest = closest_on_triangle(corners, vertex.x);
-        let distance = closest.point.distance(vertex.x);
-        let is_within = distance <= self.reach.still
-            || (distance <= most && distance <= self.reach_of(vertex, slot));
-        is_within.then_some((closest, distance))
     }
 
     /// Whether the vertex may touch a triangle: it is no corner of it and their bodies may touch.
@@ -471,16 +388,26 @@ impl Query<'_> {
         }
     }
 
-    /// The triangle of a slot if the vertex may be about to touch it or has passed it; `most` bounds its distance.
-    fn near(&self, vertex: &Vertex<'_>, slot: u32, most: f64) -> Option<Near> {
-        let facing = vertex.normals.facing(self.shape.normal(slot));
+    /// The triangle of a slot if the vertex may be about to touch it or has passed it.
+    fn near(&self, vertex: &Vertex<'_>, slot: u32) -> Option<Near> {
+        let face = self.shape.normal(slot);
+        let facing = vertex.normals.facing(face);
         if facing >= FACING && facing.is_finite() {
             return None;
         }
         let x = vertex.x;
-        let (closest, distance) = self.within_reach(vertex, slot, most)?;
-        let ClosestPoint { point, part, .. } = closest;
+        let corners = self.shape.corners(slot);
+        // The plane is no further than the triangle.
+        if face.dot(x - corners[0]).abs() > self.reach * (1.0 + ROUNDING) {
+            return None;
+        }
+        let ClosestPoint { point, part, .. } = closest_on_triangle(corners, x);
+        let squared = point.distance_squared(x);
+        if squared > self.reach * self.reach || squared.is_nan() {
+            return None;
+        }
         let key = self.shape.surface.key(slot);
+        let distance = squared.sqrt();
         if part != TrianglePart::Face {
             let closer = (distance - SAME * self.mean_edge).max(0.0);
             let rank = (rounded(facing), key);
@@ -526,7 +453,7 @@ impl Query<'_> {
             apart: near.apart.filter(|_| !near.is_inside),
             is_inside: near.is_inside,
             touching: TOUCHING * self.mean_edge,
-            reach: self.reach_of(vertex, near.slot),
+            reach: self.reach,
         };
         let (contact, slot) = face_contact(&self.shape, &meeting);
         // From the outer surface it may come to be one with the cut face that the vertex was parted from.

@@ -43,9 +43,8 @@ pub struct ContactSettings {
     /// How far surfaces may move towards each other, in mean edges, before contacts are searched again. More means
     /// fewer searches with longer lists. Above 0, at most 1.
     pub skin: f64,
-    /// How far, in mean edges, a frame may bring surfaces together before it is divided, see
-    /// [`crate::ContactDetector::intervals`]. The search looks ahead in time by four times as much, where something is that
-    /// fast. At least 0, at most 2.
+    /// The largest distance, in mean edges, that the search looks ahead in time: a frame in which surfaces approach each
+    /// other by more should be divided, see [`crate::ContactDetector::intervals`]. At least 0, at most 2.
     pub reach: f64,
 }
 

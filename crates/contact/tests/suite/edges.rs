@@ -62,18 +62,7 @@ fn compare(scene: &Scene) -> usize {
         format!("{key:?} {x:?} gap {gap} distance {distance}")
     };
     let missing: Vec<_> = expected.iter().filter(|key| !found.contains(key)).collect();
-    // Of those that had passed each other at the search before, all are known, however deep.
-    let is_deep = |key: &[u32; 4]| {
-        let contact = edges.iter().find(|contact| contact.particles == *key);
-        contact.is_some_and(|contact| {
-            let reach = scene.reach(&key[..2], &key[2..]);
-            contact.gap(&scene.positions) < 0.0 && contact.distance(&scene.positions) > reach
-        })
-    };
-    let more: Vec<_> = found
-        .iter()
-        .filter(|key| !expected.contains(key) && !is_deep(key))
-        .collect();
+    let more: Vec<_> = found.iter().filter(|key| !expected.contains(key)).collect();
     if let Some(key) = missing.first().or(more.first()) {
         panic!(
             "{} missing, {} too many: {}",

@@ -187,7 +187,7 @@ impl Slow<'_> {
             && to_own > -0.1
             && to_other < -0.3
             && far.0 != vertex
-            && closest.distance(x) <= self.scene.reach(&[vertex], &p.map(|p| p.0));
+            && closest.distance(x) <= self.scene.contacts.reach();
         if !is_swapped {
             return Some(own);
         }
@@ -204,6 +204,7 @@ impl Slow<'_> {
 
     fn vertex(&self, vertex: u32, fan: &[BoundaryTriangle], expected: &mut Expected) {
         let x = self.at(ParticleId(vertex));
+        let reach = self.scene.contacts.reach();
         let mut by_tag: BTreeMap<FaceTag, DVec3> = BTreeMap::new();
         for triangle in fan {
             *by_tag.entry(triangle.tag).or_default() += self.area(triangle);
@@ -225,10 +226,10 @@ impl Slow<'_> {
             }
             let closest = closest_on_triangle(self.corners(triangle), x);
             let distance = closest.point.distance(x);
-            let p = triangle.particles;
-            if distance > self.scene.reach(&[vertex], &p.map(|p| p.0)) {
+            if distance > reach {
                 continue;
             }
+            let p = triangle.particles;
             let feature: Vec<ParticleId> = match closest.part {
                 TrianglePart::Face => p.to_vec(),
                 TrianglePart::Side(k) => vec![p[usize::from(k)], p[usize::from(k + 1) % 3]],
@@ -425,7 +426,7 @@ impl Slow<'_> {
                 if meet {
                     distance = distance.min(p.distance(q));
                 }
-                if distance > self.scene.reach(ends, others) {
+                if distance > self.scene.contacts.reach() {
                     continue;
                 }
                 let is_above = |n: DVec3| {

@@ -109,23 +109,7 @@ impl Scene {
         })
     }
 
-    /// How far apart the search looks for particles that may touch those of another group, by the rule that its
-    /// documentation gives: a skin, the thickness, and what the frame brings them closer, up to four times what a frame is divided
-    /// for.
-    pub(crate) fn reach(&self, one: &[u32], other: &[u32]) -> f64 {
-        let settings = self.contacts.settings();
-        let edge = self.contacts.mean_edge();
-        let mut approach = 0.0_f64;
-        for &p in one {
-            for &q in other {
-                let [p, q] = [p, q].map(|p| self.velocities[p as usize]);
-                approach = approach.max((p * self.frame_time).distance(q * self.frame_time));
-            }
-        }
-        settings.skin * edge + settings.thickness + approach.min(4.0 * settings.reach * edge)
-    }
-
-    /// An update that searches for all vertices.
+    /// An update that searches.
     pub(crate) fn search(&mut self) {
         let settings = self.contacts.settings().clone();
         self.contacts.set_settings(settings).unwrap();
