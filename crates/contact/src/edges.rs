@@ -12,8 +12,7 @@
 //! 4. the plane through both directions parts the triangles of the one from those of the other. That is the condition under
 //!    which two edges, and not a vertex and a face, are what touches: on the sphere of normals, the arc between the
 //!    triangles of one edge crosses the opposite of the other's;
-//! 5. where they have passed each other, they cross no nearer to an end of either than a tenth of how deep they are, since
-//!    otherwise that end is what touches; and a way through tets leads from one of the edges to the other, as for a vertex, and
+//! 5. where they have passed each other, a way through tets leads from one of the edges to the other, as for a vertex, and
 //!    goes on as far again;
 //! 6. it is one of the four nearest of either edge, those that have passed each other first, deepest first: a long edge
 //!    over a fine rim has many near it, and is held by some of them.
@@ -40,10 +39,8 @@ const FLAT: f64 = 1e-3;
 const PARALLEL: f64 = 0.05;
 /// Triangles may lie beyond the plane between two edges by this sine.
 const BENT: f64 = 0.1;
-/// Edges that cross beyond their ends or too near to them are no candidate if they have passed by this, in mean edges.
+/// Edges whose closest points lie beyond their ends are no candidate if they have passed by this, in mean edges.
 const PASSED: f64 = 0.01;
-/// Nor are edges that have passed each other deeper than this many times the distance from where they cross to an end.
-const DEEP: f64 = 10.0;
 /// Candidates kept of an edge.
 const NEAREST: usize = 4;
 /// Edges that one task looks at.
@@ -408,10 +405,8 @@ fn contact(
             return None;
         }
     }
-    // How far inside of both edges they cross. What is much deeper than that touches with the end, which is less deep.
-    let [first, second] = on_lines(one.ends, two.ends);
-    let inside = |part: f64, [a, b]: [DVec3; 2]| part.min(1.0 - part) * a.distance(b);
-    let meet = inside(first, one.ends).min(inside(second, two.ends)) >= -gap / DEEP;
+    let parts = on_lines(one.ends, two.ends);
+    let meet = parts.iter().all(|part| (0.0..=1.0).contains(part));
     let is_valid = if meet {
         has_way(query, other, [q, p], edge) || has_way(query, edge, [p, q], other)
     } else {

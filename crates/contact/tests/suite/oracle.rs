@@ -465,11 +465,9 @@ impl Slow<'_> {
                         };
                         ways(to).iter().any(is_other) && !ways(from + (to - from) * 2.0).is_empty()
                     };
-                let room = |part: f64, a: DVec3, b: DVec3| part.min(1.0 - part) * a.distance(b);
-                let is_inside = room(lines.x, a, b).min(room(lines.y, c, d)) >= -0.1 * gap;
                 let is_valid = if gap >= 0.0 {
                     true
-                } else if is_inside {
+                } else if meet {
                     has_way(other_tets, [q, p], ends) || has_way(tets, [p, q], others)
                 } else {
                     gap > -0.01 * self.scene.contacts.mean_edge()
