@@ -11,8 +11,8 @@
 //! after a cut costs what the cut touched. Another schedule, another material or a changed mass whose incident tets
 //! were not named rebuilds all.
 //!
-//! Cost: O(tets) to build and O(particles log particles) for their order, 96 bytes a tet in single precision; to update, O(changed clusters and marked tets),
-//! amortized.
+//! Cost: to build, O(tets), and O(particles log particles) for their order; to update, O(changed clusters and marked
+//! tets), amortized. 96 bytes a tet in single precision.
 
 mod blocks;
 mod check;

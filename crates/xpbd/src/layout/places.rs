@@ -5,7 +5,7 @@
 //! only. Particles are numbered by the user's mesh, so a pass on several threads works on a copy in this order.
 //!
 //! The order halves the body across its longest side, and so on with both halves. Particles that come later have the
-//! next places. Cost: O(n log n) comparisons for all.
+//! next places, and those that are removed keep theirs. Cost: O(n log n) comparisons for all.
 
 use glam::DVec3;
 
@@ -42,7 +42,7 @@ impl Places {
     }
 
     /// The place of a particle; a new one gets the next place.
-    pub(crate) fn place(&mut self, particle: u32) -> u32 {
+    pub(super) fn place(&mut self, particle: u32) -> u32 {
         let number = particle as usize;
         if self.places.len() <= number {
             self.places.resize(number + 1, NONE);

@@ -1,8 +1,8 @@
 //! Builds a layout and updates it with its schedule.
 //!
-//! New groups take the clusters of a color by size, so that few lanes are idle, and those of one size by where they are. Later a changed cluster stays in its
-//! lane if its color is the same and its group has enough blocks. Otherwise it goes to the group of its color that was
-//! opened last, or opens one.
+//! New groups take the clusters of a color by size, so that few lanes are idle, and those of one size by place, so that
+//! each thread solves one part of space. Later a changed cluster stays in its lane if its color is the same and its group
+//! has enough blocks. Otherwise it goes to the group of its color that was opened last, or opens one.
 //!
 //! Bounds: a color is rebuilt if its blocks exceed three halves of what a rebuilt one can need; all is rebuilt if
 //! groups without clusters have half of all blocks. Both rebuilds cost at most what caused them, up to a factor of the
