@@ -288,6 +288,13 @@ impl Schedule {
         }
     }
 
+    /// The cluster of a constraint; `None` if the schedule does not solve it.
+    #[must_use]
+    pub fn cluster(&self, constraint: usize) -> Option<ClusterId> {
+        let label = self.labels.get(constraint).copied();
+        label.filter(|&label| label != ClusterId::NONE)
+    }
+
     /// The color of a cluster; `None` if it is vacant or unknown.
     #[must_use]
     pub fn color(&self, cluster: ClusterId) -> Option<ColorId> {

@@ -56,7 +56,7 @@ impl<R: Float> Damping<R> {
         }));
         let pass = Pass {
             layout,
-            corners: &layout.blocks.particles,
+            corners: &layout.blocks.corners,
             positions: &particles.cells,
             multipliers: &[],
             corrections: &[],

@@ -5,7 +5,7 @@
 //! crate applies. Changes are tracked on request only. Cost: a number an edit.
 
 use crate::constraints::{Obstacle, kept_depth};
-use crate::layout::{CONSTANTS, REST};
+use crate::layout::{CONSTANTS, ClusterOrder, OrderedTet, REST, in_slots};
 use crate::neo_hookean::MAX_COFACTOR_NORM;
 use crate::particles::Particles;
 use crate::{Changes, Float, Solver, StepSettings, TetSolve};
@@ -64,7 +64,32 @@ impl<R: Float> Solver<R> {
         let ingredients = self.tets.ingredients(&self.particles, tet);
         TetData {
             corners: ingredients.tet.particles,
-            rest: ingredients.rest(),
+            rest: ingredients.rest([0, 1, 2, 3]),
+            constants: ingredients.constants,
+        }
+    }
+
+    /// Returns the order in which the solver here solves the tets of a cluster, and that of their corners. A kernel that
+    /// uses both rounds as this solver does.
+    ///
+    /// # Panics
+    /// If a tet does not exist.
+    #[must_use]
+    pub fn solving_order(&self, tets: &[u32]) -> Vec<OrderedTet> {
+        let corners = |tet| self.tet_particles(tet as usize);
+        ClusterOrder::default().of(tets, corners).to_vec()
+    }
+
+    /// Returns [`Solver::tet_data`] of a tet with its corners in the order of their slots.
+    ///
+    /// # Panics
+    /// If the tet does not exist.
+    #[must_use]
+    pub fn ordered_tet_data(&self, ordered: OrderedTet) -> TetData<R> {
+        let ingredients = self.tets.ingredients(&self.particles, ordered.tet);
+        TetData {
+            corners: in_slots(ingredients.tet.particles, ordered.slots),
+            rest: ingredients.rest(ordered.slots),
             constants: ingredients.constants,
         }
     }

@@ -9,7 +9,7 @@ use std::fmt::Debug;
 use std::ops::{Add, AddAssign, Div, Mul, Neg, Sub};
 use std::sync::atomic::{AtomicU32, AtomicU64, Ordering};
 
-use fearless_simd::{Simd, SimdBase, SimdFloat, SimdFloatElement};
+use fearless_simd::{Simd, SimdFloat, SimdFloatElement};
 use glam::{DVec3, Vec3};
 
 use crate::transpose;
@@ -105,9 +105,10 @@ pub trait Float:
     /// Puts values into a particle's cell.
     fn write(particle: &Self::Particle, values: [Self; 4]);
 
-    /// The place of a lane's particle in four vectors of consecutive particles that [`Float::columns`] takes.
+    /// The place of the particle of one of `lanes` lanes in four vectors of consecutive particles that
+    /// [`Float::columns`] takes.
     #[doc(hidden)]
-    fn row<S: Simd>(lane: usize) -> usize;
+    fn row(lane: usize, lanes: usize) -> usize;
     /// Four vectors of particles as vectors of x, y, z and inverse masses.
     #[doc(hidden)]
     fn columns<S: Simd>(simd: S, rows: [Self::Lanes<S>; 4]) -> [Self::Lanes<S>; 4];
@@ -213,8 +214,8 @@ macro_rules! float {
                 *particle = $pack(values).map(AtomicU64::new);
             }
             #[inline(always)]
-            fn row<S: Simd>(lane: usize) -> usize {
-                $row(lane, Self::Lanes::<S>::LEN)
+            fn row(lane: usize, lanes: usize) -> usize {
+                $row(lane, lanes)
             }
             #[inline(always)]
             fn columns<S: Simd>(simd: S, rows: [Self::Lanes<S>; 4]) -> [Self::Lanes<S>; 4] {

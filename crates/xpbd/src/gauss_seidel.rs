@@ -18,8 +18,8 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
 use crate::pace::Pace;
 use crate::simd_kernel::{
-    Access, Alone, Block, BlockKernel, Damping, Pass, PlainSplit, Sequential, Shared, Split,
-    buffers,
+    Access, Alone, Block, BlockKernel, Buffers, Damping, Pass, PlainSplit, Sequential, Shared,
+    Split, exchange, read_all, read_changed, write_lanes,
 };
 use crate::team::parallel_rounds;
 use crate::{Float, TetSolve};
@@ -159,7 +159,7 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
         let solve = |pass: &Pass<'_, R>, cells: &[R::Particle], color: usize, chunk: usize| {
             let all = layout.groups_of(color);
             let own = &all[part(all.len(), chunk, chunks(color))];
-            groups::<R, S, K>(simd, pass, &mut Shared(cells), own);
+            groups::<R, S, K>(simd, pass, Shared(cells), own);
         };
         if !pass.corrections.is_empty() || !pass.refused.is_empty() {
             parallel_rounds(colors, chunks, |color, chunk| {
@@ -224,37 +224,75 @@ fn alone<R: Float, S: Simd, K: BlockKernel>(
     cells: &mut [R::Particle],
 ) {
     for color in 0..pass.layout.color_count() {
-        groups::<R, S, K>(simd, pass, &mut Alone(cells), pass.layout.groups_of(color));
+        groups::<R, S, K>(simd, pass, Alone(cells), pass.layout.groups_of(color));
     }
 }
 
 /// Solves the tets of some groups of a color.
+///
+/// The corners of a block stay in its buffers until another corner takes their slot or their lane has no more tets; until
+/// then no other group reads them, since clusters of a color share no particle.
 #[inline(always)]
 fn groups<R: Float, S: Simd, K: BlockKernel>(
     simd: S,
     pass: &Pass<'_, R>,
-    cells: &mut impl Access<R>,
+    particles: impl Access<R>,
     groups: &[u32],
 ) {
     simd.vectorize(
         #[inline(always)]
-        || {
-            let mut buffers = buffers::<R>();
+        move || {
+            // Variables of their own: behind references they would be loaded again for each corner.
+            let (mut particles, mut at) = (particles, Shared(pass.positions));
+            let blocks = &pass.layout.blocks;
+            let mut buffers = [Buffers::<R>::new(); TURNS];
+            let mut positions = [Buffers::<R>::new(); TURNS];
             for together in groups.chunks(TURNS) {
                 let mut next = [(0, 0); TURNS];
-                for (next, &group) in next.iter_mut().zip(together) {
-                    let blocks = pass.layout.blocks_of(group);
-                    *next = (blocks.start, blocks.end);
+                for (turn, &group) in together.iter().enumerate() {
+                    let range = pass.layout.blocks_of(group);
+                    next[turn] = (range.start, range.end);
+                    if range.is_empty() {
+                        continue;
+                    }
+                    let corners = pass.corners_of::<S>(range.start);
+                    read_all::<R, S>(&mut particles, corners, &mut buffers[turn]);
+                    if K::READS_POSITIONS {
+                        read_all::<R, S>(&mut at, corners, &mut positions[turn]);
+                    }
                 }
                 let mut is_left = true;
                 while is_left {
                     is_left = false;
-                    for (block, end) in &mut next {
-                        if block < end {
-                            K::run(simd, pass, cells, &mut buffers, *block);
-                            *block += 1;
-                            is_left = true;
+                    for ((next, buffers), positions) in
+                        next.iter_mut().zip(&mut buffers).zip(&mut positions)
+                    {
+                        let (block, end) = *next;
+                        if block >= end {
+                            continue;
                         }
+                        K::run(simd, pass, buffers, positions, block);
+                        let corners = pass.corners_of::<S>(block);
+                        let following = block + 1;
+                        let mut ending = blocks.active[block];
+                        if following < end {
+                            ending &= !blocks.active[following];
+                        }
+                        if ending != 0 {
+                            write_lanes::<R, S>(corners, ending, buffers, |p, values| {
+                                particles.write(p, values);
+                            });
+                        }
+                        if following < end {
+                            let coming = pass.corners_of::<S>(following);
+                            let changed = blocks.changed[following];
+                            exchange::<R, S>(&mut particles, [corners, coming], changed, buffers);
+                            if K::READS_POSITIONS {
+                                read_changed::<R, S>(&mut at, coming, changed, positions);
+                            }
+                        }
+                        *next = (following, end);
+                        is_left = true;
                     }
                 }
             }
@@ -364,7 +402,7 @@ mod tests {
         let positions = moved(1.0);
         let pass = Pass {
             layout,
-            corners: &layout.blocks.particles,
+            corners: &layout.blocks.corners,
             positions: &[],
             multipliers: &[],
             corrections: &[],

@@ -89,6 +89,7 @@ pub use float::Float;
 pub use float::Saved;
 pub use force::Force;
 pub use forces::Forces;
+pub use layout::OrderedTet;
 pub use material::Material;
 pub use measure::{Energy, Softened, Volume};
 pub use pose::Pose;

@@ -68,7 +68,10 @@ impl<R: Float> TetConstraint<R> {
         let inverse = edges.inverse();
         let rows = [inverse.row(0), inverse.row(1), inverse.row(2)];
         let stiffness = material.mu() * volume;
-        let entries = rows.iter().flat_map(|r| r.to_array()).chain([stiffness]);
+        // The gradient of corner 0 is stored in place of another one if that keeps its slot from one tet to the next.
+        let first = rows[0] + rows[1] + rows[2];
+        let rows_of_all = rows.iter().chain([&first]);
+        let entries = rows_of_all.flat_map(|r| r.to_array()).chain([stiffness]);
         let sound = volume > 0.0 && entries.into_iter().all(|v| R::from_f64(v).is_finite());
         // A tet too flat to be represented takes no part: without stiffness it leaves its corners to its neighbors.
         let entry = |v: f64| if sound { R::from_f64(v) } else { R::ZERO };

@@ -241,7 +241,7 @@ impl<R: Float> Stepper<R> {
         }
         let pass = Pass {
             layout,
-            corners: &layout.blocks.particles,
+            corners: &layout.blocks.corners,
             positions: &[],
             multipliers,
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),

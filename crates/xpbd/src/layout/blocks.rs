@@ -2,6 +2,7 @@
 
 use glam::DVec4;
 
+use super::order::{OrderedTet, Slots, in_slots};
 use super::places::Places;
 use crate::Float;
 use crate::neo_hookean::TetConstraint;
@@ -23,12 +24,17 @@ pub(crate) struct Blocks<R> {
     uniform: bool,
     /// Block -> a bit for each lane that has a tet.
     pub(crate) active: Vec<u16>,
-    /// Slot -> corners; particle 0 in slots without a tet.
-    pub(crate) particles: Vec<[u32; 4]>,
-    /// Slot -> places of the corners; place 0 in slots without a tet.
-    pub(crate) places: Vec<[u32; 4]>,
+    /// Block, corner, row: the particles at the corners; particle 0 where there is no tet.
+    pub(crate) corners: Vec<u32>,
+    /// Block, corner, row: the places of the corners; place 0 where there is no tet.
+    pub(crate) places: Vec<u32>,
+    /// Block -> a bit for each corner and row, in the order of `corners`, whose particle is another one than in the block
+    /// before. None is set in the first tet of a lane.
+    pub(crate) changed: Vec<u64>,
     /// Slot -> tet, where there is one.
     pub(super) tets: Vec<u32>,
+    /// Slot -> the order of the corners of the tet.
+    pub(super) orders: Vec<Slots>,
     /// Block, number, lane: what a tet is at rest.
     pub(crate) rest: Vec<R>,
     /// Block, number, lane: the material. Empty if all have the same, which is `constant` then.
@@ -47,10 +53,18 @@ pub(crate) struct Ingredients<R> {
 }
 
 impl<R: Float> Ingredients<R> {
-    /// What is stored for the tet.
-    pub(crate) fn rest(&self) -> [R; REST] {
+    /// What is stored for the tet with its corners in these slots. F, its metric and the stiffness do not depend on the
+    /// order of the corners; the gradients are those of the barycentric coordinates of the corners in slots 1 to 3.
+    pub(crate) fn rest(&self, slots: Slots) -> [R; REST] {
         let mut rest = [self.tet.stiffness; REST];
-        rest[..9].copy_from_slice(&self.tet.inverse_rest);
+        let [q1, q2, q3] =
+            [0, 3, 6].map(|start| [0, 1, 2].map(|axis| self.tet.inverse_rest[start + axis]));
+        let q0 = [0, 1, 2].map(|axis| {
+            let sum = q1[axis].to_f64() + q2[axis].to_f64() + q3[axis].to_f64();
+            R::from_f64(0.0 - sum)
+        });
+        let gradients = in_slots([q0, q1, q2, q3], slots);
+        rest[..9].copy_from_slice(gradients[1..].as_flattened());
         rest[9..15].copy_from_slice(&metric_factor(&self.tet, self.weights));
         rest
     }
@@ -62,9 +76,11 @@ impl<R: Float> Default for Blocks<R> {
             lanes: 1,
             uniform: true,
             active: Vec::new(),
-            particles: Vec::new(),
+            corners: Vec::new(),
             places: Vec::new(),
+            changed: Vec::new(),
             tets: Vec::new(),
+            orders: Vec::new(),
             rest: Vec::new(),
             constants: Vec::new(),
             constant: [R::ZERO; CONSTANTS],
@@ -82,9 +98,11 @@ impl<R: Float> Blocks<R> {
     pub(super) fn reset(&mut self, lanes: usize, uniform: bool) {
         (self.lanes, self.uniform) = (lanes, uniform);
         self.active.clear();
-        self.particles.clear();
+        self.corners.clear();
         self.places.clear();
+        self.changed.clear();
         self.tets.clear();
+        self.orders.clear();
         self.rest.clear();
         self.constants.clear();
     }
@@ -93,21 +111,78 @@ impl<R: Float> Blocks<R> {
     pub(super) fn grow(&mut self, blocks: usize) {
         let slots = blocks * self.lanes;
         self.active.resize(blocks, 0);
-        self.particles.resize(slots, [0; 4]);
-        self.places.resize(slots, [0; 4]);
+        self.corners.resize(4 * slots, 0);
+        self.places.resize(4 * slots, 0);
+        self.changed.resize(blocks, 0);
         self.tets.resize(slots, NONE);
+        self.orders.resize(slots, [0; 4]);
         self.rest.resize(slots * REST, R::ZERO);
         if !self.uniform {
             self.constants.resize(slots * CONSTANTS, R::ZERO);
         }
     }
 
-    /// Writes the numbers of a tet into the slot that it has.
-    pub(super) fn fill(&mut self, slot: usize, ingredients: &Ingredients<R>, places: &mut Places) {
+    /// Where the corners of a slot are in `corners` and `places`.
+    pub(super) fn corners_of(&self, slot: usize) -> [usize; 4] {
         let lanes = self.lanes;
         let (block, lane) = (slot / lanes, slot % lanes);
-        self.particles[slot] = ingredients.tet.particles;
-        self.places[slot] = ingredients.tet.particles.map(|p| places.place(p));
+        [0, 1, 2, 3].map(|k| (4 * block + k) * lanes + R::row(lane, lanes))
+    }
+
+    /// Whether the corners of the tet in a slot are these, in the order that they were filled in.
+    pub(super) fn has_corners(&self, slot: usize, corners: [u32; 4]) -> bool {
+        let known = self.corners_of(slot).map(|i| self.corners[i]);
+        known == in_slots(corners, self.orders[slot])
+    }
+
+    /// Writes a tet into a slot of an active lane. `is_first` says that it is the first of its lane.
+    pub(super) fn put(
+        &mut self,
+        slot: usize,
+        ordered: OrderedTet,
+        is_first: bool,
+        ingredients: &Ingredients<R>,
+        places: &mut Places,
+    ) {
+        let lanes = self.lanes;
+        let block = slot / lanes;
+        self.active[block] |= 1 << (slot % lanes);
+        self.tets[slot] = ordered.tet;
+        self.orders[slot] = ordered.slots;
+        let corners = in_slots(ingredients.tet.particles, ordered.slots);
+        for (i, corner) in self.corners_of(slot).into_iter().zip(corners) {
+            self.corners[i] = corner;
+            self.places[i] = places.place(corner);
+            let bit = 1 << (i - 4 * block * lanes);
+            if is_first || self.corners[i - 4 * lanes] == corner {
+                self.changed[block] &= !bit;
+            } else {
+                self.changed[block] |= bit;
+            }
+        }
+        self.fill(slot, ingredients);
+    }
+
+    /// Removes the tet of a slot. Without a rest shape F is 0 in its lane, which is near no rare branch of the kernel.
+    pub(super) fn clear(&mut self, slot: usize) {
+        let lanes = self.lanes;
+        let (block, lane) = (slot / lanes, slot % lanes);
+        self.active[block] &= !(1 << lane);
+        for i in self.corners_of(slot) {
+            // A particle that is there as long as any is.
+            (self.corners[i], self.places[i]) = (0, 0);
+            self.changed[block] &= !(1 << (i - 4 * block * lanes));
+        }
+        let rest = &mut self.rest[block * REST * lanes..(block + 1) * REST * lanes];
+        for value in rest.iter_mut().skip(lane).step_by(lanes) {
+            *value = R::ZERO;
+        }
+    }
+
+    /// Writes the numbers of the tet in a slot, whose corners are there.
+    pub(super) fn fill(&mut self, slot: usize, ingredients: &Ingredients<R>) {
+        let lanes = self.lanes;
+        let (block, lane) = (slot / lanes, slot % lanes);
         if self.uniform {
             self.constant = ingredients.constants;
         } else {
@@ -117,21 +192,21 @@ impl<R: Float> Blocks<R> {
             }
         }
         let start = block * REST * lanes + lane;
-        for (k, value) in ingredients.rest().into_iter().enumerate() {
+        for (k, value) in ingredients.rest(self.orders[slot]).into_iter().enumerate() {
             self.rest[start + k * lanes] = value;
         }
     }
 
     /// Whether a slot has a tet, as it is now, to the bit.
-    pub(super) fn has(&self, slot: usize, tet: u32, now: &Ingredients<R>) -> bool {
+    pub(super) fn has(&self, slot: usize, ordered: OrderedTet, now: &Ingredients<R>) -> bool {
         let lanes = self.lanes;
         let (block, lane) = (slot / lanes, slot % lanes);
         let same = |a: R, b: R| a.to_f64().to_bits() == b.to_f64().to_bits();
-        let rest = now.rest().into_iter().enumerate();
+        let rest = now.rest(ordered.slots).into_iter().enumerate();
         let constants = now.constants.into_iter().enumerate();
         self.active[block] & (1 << lane) != 0
-            && self.tets[slot] == tet
-            && self.particles[slot] == now.tet.particles
+            && (self.tets[slot], self.orders[slot]) == (ordered.tet, ordered.slots)
+            && self.has_corners(slot, now.tet.particles)
             && rest.fold(true, |all, (k, value)| {
                 all && same(self.rest[(block * REST + k) * lanes + lane], value)
             })

@@ -1,8 +1,11 @@
 //! Checks that a layout agrees bit for bit with its schedule and tets.
 
+use std::collections::HashMap;
+
 use incise_graph::{ClusterId, Schedule};
 
 use super::groups::Usage;
+use super::order::ClusterOrder;
 use super::{Ingredients, Layout};
 use crate::{Float, XpbdError};
 
@@ -34,6 +37,7 @@ impl<R: Float> Layout<R> {
                 usage.blocks += known.depth;
             }
         }
+        let mut order = ClusterOrder::default();
         let (mut tets, mut taken) = (0, vec![0_u64; self.groups.lanes.group_count()]);
         for (color, usage) in usages.iter_mut().enumerate() {
             for &cluster in schedule.clusters(color) {
@@ -42,17 +46,21 @@ impl<R: Float> Layout<R> {
                     return wrong("cluster", cluster.index());
                 }
                 let (group, lane) = self.groups.lanes.slot(cluster).unwrap_or_default();
-                for (block, &tet) in self.groups.blocks(group).zip(members) {
-                    let slot = block * self.blocks.lanes + lane;
-                    if self.slot(tet as usize) != Some((block, lane))
-                        || !self.blocks.has(slot, tet, &ingredients(tet))
-                        || !(0..4).all(|k| {
-                            let corner = self.blocks.particles[slot][k];
-                            self.places.has(corner, self.blocks.places[slot][k])
+                let ordered = order.of(members, |tet| ingredients(tet).tet.particles);
+                for (block, &ordered) in self.groups.blocks(group).zip(ordered) {
+                    let (slot, tet) = (block * self.blocks.lanes + lane, ordered.tet as usize);
+                    if self.slot(tet) != Some((block, lane))
+                        || !self.blocks.has(slot, ordered, &ingredients(ordered.tet))
+                        || !self.blocks.corners_of(slot).into_iter().all(|i| {
+                            self.places
+                                .has(self.blocks.corners[i], self.blocks.places[i])
                         })
                     {
-                        return wrong("tet", tet as usize);
+                        return wrong("tet", tet);
                     }
+                }
+                if !self.moves_right_corners(group, lane, |tet| ingredients(tet).tet.particles) {
+                    return wrong("corners of cluster", cluster.index());
                 }
                 usage.tets += u32::try_from(members.len()).unwrap_or(u32::MAX);
                 tets += members.len();
@@ -83,6 +91,62 @@ impl<R: Float> Layout<R> {
             Some(group) => wrong("group", group),
             None => Ok(()),
         }
+    }
+
+    /// Whether a kernel that moves corners by the masks of a lane gives each tet its corners as the tets before left them,
+    /// and all of them back to the particles.
+    fn moves_right_corners(
+        &self,
+        group: usize,
+        lane: usize,
+        corners: impl Fn(u32) -> [u32; 4],
+    ) -> bool {
+        let blocks = &self.blocks;
+        let is_active = |block: usize| blocks.active[block] & (1 << lane) != 0;
+        let range = self.groups.blocks(group);
+        // Particle -> one plus the block that moved it last, as memory has it and as it is.
+        let (mut memory, mut latest) = (HashMap::new(), HashMap::new());
+        let mut held = [None; 4];
+        for block in range.clone() {
+            let slot = block * blocks.lanes + lane;
+            let at = blocks.corners_of(slot);
+            let is_changed = at.map(|i| {
+                let bit = i - 4 * block * blocks.lanes;
+                blocks.changed[block] & (1 << bit) != 0
+            });
+            if is_changed != [false; 4] && (block == range.start || !is_active(block)) {
+                return false;
+            }
+            let comes = |k: usize| is_changed[k] || block == range.start;
+            let leaving = (0..4).filter(|&k| comes(k)).filter_map(|k| held[k]);
+            memory.extend(leaving);
+            for k in (0..4).filter(|&k| comes(k)) {
+                let particle = blocks.corners[at[k]];
+                held[k] = Some((particle, memory.get(&particle).copied().unwrap_or(0)));
+            }
+            if !is_active(block) {
+                continue;
+            }
+            let mut own = corners(blocks.tets[slot]);
+            let mut found = held.map(|held| held.map_or(u32::MAX, |(particle, _)| particle));
+            own.sort_unstable();
+            found.sort_unstable();
+            let mut known = held.iter().flatten();
+            if own != found
+                || !known
+                    .all(|(particle, time)| *time == latest.get(particle).copied().unwrap_or(0))
+            {
+                return false;
+            }
+            for (particle, time) in held.iter_mut().flatten() {
+                *time = block + 1;
+                latest.insert(*particle, *time);
+            }
+            if block + 1 == range.end || !is_active(block + 1) {
+                memory.extend(held.iter().flatten().copied());
+            }
+        }
+        memory == latest
     }
 
     /// Whether a cluster has a lane for itself in its color, with blocks enough.

@@ -3,11 +3,13 @@
 //! Clusters of one color share no particle, so as many of them as a processor has lanes are solved side by side: lane
 //! by lane the first tet of each, then the second. A *group* is such a set of clusters (`groups.rs`), a *block* one tet
 //! of each (`blocks.rs`). The grouping changes the order of work only, since each cluster sees only its own particles.
+//! Tets of a cluster that share corners follow each other (`order.rs`), so that the kernel keeps these corners.
 //! Groups of a color follow each other in space, and so do the copies of particles that several threads work on
 //! (`places.rs`): thus each thread keeps to its own part of the body.
 //!
 //! A layout is updated with its schedule (`update.rs`): groups keep their blocks, a changed cluster is moved from its
-//! lane to a free one, and a tet whose corners, rest shape or masses changed is marked and filled in again. So a frame
+//! lane to a free one, and a tet whose rest shape or masses changed is marked and filled in again, with its cluster if its
+//! corners changed. So a frame
 //! after a cut costs what the cut touched. Another schedule, another material or a changed mass whose incident tets
 //! were not named rebuilds all.
 //!
@@ -17,6 +19,7 @@
 mod blocks;
 mod check;
 mod groups;
+mod order;
 mod places;
 mod update;
 
@@ -28,6 +31,8 @@ use crate::Float;
 use blocks::Blocks;
 pub(crate) use blocks::{CONSTANTS, Ingredients, REST};
 use groups::Groups;
+pub use order::OrderedTet;
+pub(crate) use order::{ClusterOrder, in_slots};
 use places::Places;
 
 /// No slot.
@@ -49,6 +54,7 @@ pub(crate) struct Layout<R> {
     marked: Vec<bool>,
     /// Working memory.
     clusters: Vec<ClusterId>,
+    order: ClusterOrder,
 }
 
 impl<R: Float> Default for Layout<R> {
@@ -62,6 +68,7 @@ impl<R: Float> Default for Layout<R> {
             dirty: Vec::new(),
             marked: Vec::new(),
             clusters: Vec::new(),
+            order: ClusterOrder::default(),
         }
     }
 }

@@ -117,10 +117,17 @@ impl<R: Float> Layout<R> {
         for tet in dirty.drain(..) {
             if std::mem::take(&mut self.marked[tet as usize]) {
                 let slot = self.slots[tet as usize];
-                if slot != NONE {
-                    self.blocks
-                        .fill(slot as usize, &ingredients(tet), &mut self.places);
+                if slot == NONE {
+                    continue;
+                }
+                let now = ingredients(tet);
+                if self.blocks.has_corners(slot as usize, now.tet.particles) {
+                    self.blocks.fill(slot as usize, &now);
                     filled += 1;
+                } else if let Some(cluster) = schedule.cluster(tet as usize) {
+                    // Other corners may give its cluster another order.
+                    self.empty(cluster);
+                    filled += self.fill_lane(cluster, schedule, ingredients);
                 }
             }
         }
@@ -188,17 +195,25 @@ impl<R: Float> Layout<R> {
             self.groups.lanes.group(group).color,
         );
         let tets = schedule.constraints(cluster);
-        for (block, &tet) in blocks.zip(tets) {
+        let first = blocks.start;
+        let order = self.order.of(tets, |tet| ingredients(tet).tet.particles);
+        for (block, &ordered) in blocks.zip(order) {
             let slot = block * self.blocks.lanes + lane;
-            if self.slots.len() <= tet as usize {
-                self.slots.resize(tet as usize + 1, NONE);
-                self.marked.resize(tet as usize + 1, false);
+            let tet = ordered.tet as usize;
+            if self.slots.len() <= tet {
+                self.slots.resize(tet + 1, NONE);
+                self.marked.resize(tet + 1, false);
             }
-            self.blocks.active[block] |= 1 << lane;
-            self.blocks.tets[slot] = tet;
-            self.slots[tet as usize] = index(slot);
-            self.blocks.fill(slot, &ingredients(tet), &mut self.places);
-            self.marked[tet as usize] = false;
+            self.slots[tet] = index(slot);
+            self.marked[tet] = false;
+            let ingredients = ingredients(ordered.tet);
+            self.blocks.put(
+                slot,
+                ordered,
+                block == first,
+                &ingredients,
+                &mut self.places,
+            );
         }
         self.groups.usages[color as usize].tets += index(tets.len());
         tets.len()
@@ -212,11 +227,8 @@ impl<R: Float> Layout<R> {
             if self.blocks.active[block] & (1 << lane) == 0 {
                 break;
             }
-            self.blocks.active[block] &= !(1 << lane);
             let slot = block * self.blocks.lanes + lane;
-            // A particle that is there as long as any is.
-            self.blocks.particles[slot] = [0; 4];
-            self.blocks.places[slot] = [0; 4];
+            self.blocks.clear(slot);
             self.slots[self.blocks.tets[slot] as usize] = NONE;
             self.groups.usages[color as usize].tets -= 1;
         }

@@ -1,9 +1,12 @@
 //! Transfers between SIMD lanes and memory: corners of tets and multipliers.
 //!
-//! Corners pass through a buffer, since no instruction set loads vectors from many places as fast. Rolled loops move
-//! them: unrolled, the compiler keeps indices on the stack. Cost: for each corner of each tet a check of its index, and
-//! in single precision a move from the particle to the buffer and one back if a single thread runs, two each if several
-//! do; then a transposition of the buffer by lanes.
+//! Corners pass through a buffer, since no instruction set loads vectors from many places as fast. A corner that the next
+//! tet of a lane shares stays in the buffer, in the same slot: [`crate::layout`] orders tets and corners for that. So a
+//! block exchanges the corners that change, by a mask, and a lane writes back all four after its last tet.
+//!
+//! Cost: for each corner that is exchanged two checks of an index, a move from the buffer to the particle that leaves and
+//! one of the particle that comes to the buffer, if a single thread runs in single precision; twice the moves if several
+//! do or in double precision without wide registers. For each block a transposition of the buffer by lanes.
 
 use fearless_simd::{Simd, SimdBase, SimdFrom};
 
@@ -13,17 +16,31 @@ use crate::Float;
 /// Most lanes of any instruction set.
 const MOST_LANES: usize = 16;
 
-/// A particle in each lane.
-type Buffer<R> = [[R; 4]; MOST_LANES];
+/// A particle in each lane for each of the four corners: corner by corner, and within a corner in the rows of
+/// [`Float::row`]. They are made once for many blocks, since clearing them costs as much as filling them.
+#[derive(Clone, Copy, Debug)]
+#[repr(align(64))]
+pub(crate) struct Buffers<R>([[R; 4]; 4 * MOST_LANES]);
 
-/// A particle in each lane for each of the four corners. They are made once for many blocks, since clearing them costs
-/// as much as filling them.
-pub(crate) type Buffers<R> = [Buffer<R>; 4];
+impl<R: Float> Buffers<R> {
+    /// Empty buffers.
+    #[inline(always)]
+    pub(crate) fn new() -> Self {
+        Self([[R::ZERO; 4]; 4 * MOST_LANES])
+    }
 
-/// Empty buffers.
-#[inline(always)]
-pub(crate) fn buffers<R: Float>() -> Buffers<R> {
-    [[[R::ZERO; 4]; MOST_LANES]; 4]
+    /// The numbers of a corner in all lanes.
+    #[inline(always)]
+    fn corner<S: Simd>(&self, k: usize) -> &[R] {
+        let numbers = 4 * R::Lanes::<S>::LEN;
+        &self.0.as_flattened()[k * numbers..(k + 1) * numbers]
+    }
+
+    #[inline(always)]
+    fn corner_mut<S: Simd>(&mut self, k: usize) -> &mut [R] {
+        let numbers = 4 * R::Lanes::<S>::LEN;
+        &mut self.0.as_flattened_mut()[k * numbers..(k + 1) * numbers]
+    }
 }
 
 #[inline(always)]
@@ -33,11 +50,9 @@ pub(super) fn splat<R: Float, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
 
 /// The particles of a pass.
 pub(crate) trait Access<R: Float> {
-    /// Copies the corners of the tets in all lanes into the buffers.
-    fn read<S: Simd>(&mut self, corners: &[[u32; 4]], buffers: &mut Buffers<R>);
+    fn read(&mut self, particle: u32) -> [R; 4];
 
-    /// Copies the corners of the tets in active lanes from the buffers.
-    fn write<S: Simd>(&mut self, corners: &[[u32; 4]], active: u16, buffers: &Buffers<R>);
+    fn write(&mut self, particle: u32, values: [R; 4]);
 }
 
 /// Particles that several threads see: atomic moves of 64 bits.
@@ -48,138 +63,134 @@ pub(crate) struct Alone<'a, R: Float>(pub(crate) &'a mut [R::Particle]);
 
 impl<R: Float> Access<R> for Shared<'_, R> {
     #[inline(always)]
-    fn read<S: Simd>(&mut self, corners: &[[u32; 4]], buffers: &mut Buffers<R>) {
-        let cells = self.0;
-        read_corners::<R, S>(corners, buffers, |p| R::read(&cells[p as usize]));
+    fn read(&mut self, particle: u32) -> [R; 4] {
+        R::read(&self.0[particle as usize])
     }
 
     #[inline(always)]
-    fn write<S: Simd>(&mut self, corners: &[[u32; 4]], active: u16, buffers: &Buffers<R>) {
-        let cells = self.0;
-        let write = |p: u32, values| R::write(&cells[p as usize], values);
-        write_corners::<R, S>(corners, active, buffers, write);
+    fn write(&mut self, particle: u32, values: [R; 4]) {
+        R::write(&self.0[particle as usize], values);
     }
 }
 
-// The slice is a variable of its own: behind the reference it would be loaded again for each corner.
 impl<R: Float> Access<R> for Alone<'_, R> {
     #[inline(always)]
-    fn read<S: Simd>(&mut self, corners: &[[u32; 4]], buffers: &mut Buffers<R>) {
-        let cells = &mut *self.0;
-        let read = |p: u32| R::read_alone(&mut cells[p as usize]);
-        read_corners::<R, S>(corners, buffers, read);
+    fn read(&mut self, particle: u32) -> [R; 4] {
+        R::read_alone(&mut self.0[particle as usize])
     }
 
     #[inline(always)]
-    fn write<S: Simd>(&mut self, corners: &[[u32; 4]], active: u16, buffers: &Buffers<R>) {
-        let cells = &mut *self.0;
-        let write = |p: u32, values| R::write_alone(&mut cells[p as usize], values);
-        write_corners::<R, S>(corners, active, buffers, write);
+    fn write(&mut self, particle: u32, values: [R; 4]) {
+        R::write_alone(&mut self.0[particle as usize], values);
     }
 }
 
-#[expect(
-    clippy::needless_range_loop,
-    reason = "four lanes by number have rows that the compiler knows"
-)]
+/// Reads the corners of the tets in all lanes of a block.
 #[inline(always)]
-fn read_corners<R: Float, S: Simd>(
-    corners: &[[u32; 4]],
+pub(crate) fn read_all<R: Float, S: Simd>(
+    particles: &mut impl Access<R>,
+    corners: &[u32],
     buffers: &mut Buffers<R>,
-    mut read: impl FnMut(u32) -> [R; 4],
 ) {
-    let lanes = R::Lanes::<S>::LEN;
-    let corners = &corners[..lanes];
-    let [a, b, c, d] = buffers;
-    // Four lanes at a time, of which the compiler knows the rows.
-    for first in (0..lanes).step_by(4) {
-        for lane in first..(first + 4).min(lanes) {
-            let (corner, row) = (corners[lane], R::row::<S>(lane));
-            a[row] = read(corner[0]);
-            b[row] = read(corner[1]);
-            c[row] = read(corner[2]);
-            d[row] = read(corner[3]);
+    let count = 4 * R::Lanes::<S>::LEN;
+    let (corners, buffers) = (&corners[..count], &mut buffers.0[..count]);
+    // Rolled: with all corners unrolled, the compiler keeps indices on the stack.
+    for first in (0..count).step_by(8) {
+        for i in first..first + 8 {
+            buffers[i] = particles.read(corners[i]);
         }
     }
 }
 
-/// Hands each corner of each tet in an active lane to `write`.
-#[expect(
-    clippy::needless_range_loop,
-    reason = "four lanes by number have rows that the compiler knows"
-)]
+/// Writes the corners whose bits are set in `changed`, of a block to particles, and reads those of the next block in
+/// their place.
 #[inline(always)]
-pub(super) fn write_corners<R: Float, S: Simd>(
-    corners: &[[u32; 4]],
-    active: u16,
-    [a, b, c, d]: &Buffers<R>,
+pub(crate) fn exchange<R: Float, S: Simd>(
+    particles: &mut impl Access<R>,
+    [leaving, coming]: [&[u32]; 2],
+    changed: u64,
+    buffers: &mut Buffers<R>,
+) {
+    let count = 4 * R::Lanes::<S>::LEN;
+    let (leaving, coming) = (&leaving[..count], &coming[..count]);
+    let buffers = &mut buffers.0[..count];
+    let mut left = changed;
+    while left != 0 {
+        let i = left.trailing_zeros() as usize % count;
+        left &= left - 1;
+        particles.write(leaving[i], buffers[i]);
+        buffers[i] = particles.read(coming[i]);
+    }
+}
+
+/// Reads the corners whose bits are set in `changed`.
+#[inline(always)]
+pub(crate) fn read_changed<R: Float, S: Simd>(
+    particles: &mut impl Access<R>,
+    coming: &[u32],
+    changed: u64,
+    buffers: &mut Buffers<R>,
+) {
+    let count = 4 * R::Lanes::<S>::LEN;
+    let (coming, buffers) = (&coming[..count], &mut buffers.0[..count]);
+    let mut left = changed;
+    while left != 0 {
+        let i = left.trailing_zeros() as usize % count;
+        left &= left - 1;
+        buffers[i] = particles.read(coming[i]);
+    }
+}
+
+/// Hands each corner of the tets in some lanes to `write`.
+#[inline(always)]
+pub(crate) fn write_lanes<R: Float, S: Simd>(
+    corners: &[u32],
+    lanes: u16,
+    buffers: &Buffers<R>,
     mut write: impl FnMut(u32, [R; 4]),
 ) {
-    let lanes = R::Lanes::<S>::LEN;
-    let corners = &corners[..lanes];
-    // Most blocks are full: they need no look at each bit.
-    if active.count_ones() as usize == lanes {
-        for first in (0..lanes).step_by(4) {
-            for lane in first..(first + 4).min(lanes) {
-                let (corner, row) = (corners[lane], R::row::<S>(lane));
-                write(corner[0], a[row]);
-                write(corner[1], b[row]);
-                write(corner[2], c[row]);
-                write(corner[3], d[row]);
+    let length = R::Lanes::<S>::LEN;
+    let count = 4 * length;
+    let (corners, buffers) = (&corners[..count], &buffers.0[..count]);
+    // The lanes of most groups end together: they need no look at each bit.
+    if lanes.count_ones() as usize == length {
+        for first in (0..count).step_by(8) {
+            for i in first..first + 8 {
+                write(corners[i], buffers[i]);
             }
         }
     } else {
-        let mut left = active;
+        let mut left = lanes;
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            let (corner, row) = (corners[lane], R::row::<S>(lane) % MOST_LANES);
-            write(corner[0], a[row]);
-            write(corner[1], b[row]);
-            write(corner[2], c[row]);
-            write(corner[3], d[row]);
+            let row = R::row(lane, length) % length;
+            for k in 0..4 {
+                let i = k * length + row;
+                write(corners[i], buffers[i]);
+            }
         }
     }
 }
 
-/// The corners of the tets in all lanes: x, y, z and the inverse mass of each.
+/// The corners in the buffers: x, y, z and the inverse mass of each.
 #[inline(always)]
-pub(super) fn gather<R: Float, S: Simd>(
-    simd: S,
-    particles: &mut impl Access<R>,
-    corners: &[[u32; 4]],
-    buffers: &mut Buffers<R>,
-) -> [[R::Lanes<S>; 4]; 4] {
-    // First all that is written, then all that is read: a wide load cannot overtake the narrow stores it needs.
-    particles.read::<S>(corners, buffers);
-    gathered(simd, buffers)
-}
-
-/// The corners in the buffers.
-#[inline(always)]
-pub(super) fn gathered<R: Float, S: Simd>(
-    simd: S,
-    [a, b, c, d]: &Buffers<R>,
-) -> [[R::Lanes<S>; 4]; 4] {
+pub(super) fn gathered<R: Float, S: Simd>(simd: S, buffers: &Buffers<R>) -> [[R::Lanes<S>; 4]; 4] {
     [
-        R::columns(simd, load_rows::<R, S>(simd, a)),
-        R::columns(simd, load_rows::<R, S>(simd, b)),
-        R::columns(simd, load_rows::<R, S>(simd, c)),
-        R::columns(simd, load_rows::<R, S>(simd, d)),
+        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(0))),
+        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(1))),
+        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(2))),
+        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(3))),
     ]
 }
 
 /// Puts corners into the buffers.
 #[inline(always)]
-pub(super) fn put<R: Float, S: Simd>(
-    simd: S,
-    x: &[[R::Lanes<S>; 4]; 4],
-    [a, b, c, d]: &mut Buffers<R>,
-) {
-    store_rows::<R, S>(R::rows(simd, x[0]), a);
-    store_rows::<R, S>(R::rows(simd, x[1]), b);
-    store_rows::<R, S>(R::rows(simd, x[2]), c);
-    store_rows::<R, S>(R::rows(simd, x[3]), d);
+pub(super) fn put<R: Float, S: Simd>(simd: S, x: &[[R::Lanes<S>; 4]; 4], buffers: &mut Buffers<R>) {
+    store_rows::<R, S>(R::rows(simd, x[0]), buffers.corner_mut::<S>(0));
+    store_rows::<R, S>(R::rows(simd, x[1]), buffers.corner_mut::<S>(1));
+    store_rows::<R, S>(R::rows(simd, x[2]), buffers.corner_mut::<S>(2));
+    store_rows::<R, S>(R::rows(simd, x[3]), buffers.corner_mut::<S>(3));
 }
 
 /// Moves the corners in the buffers, which for that do not have to stay in registers.
@@ -187,31 +198,30 @@ pub(super) fn put<R: Float, S: Simd>(
 pub(super) fn shift<R: Float, S: Simd>(
     simd: S,
     changes: &[[R::Lanes<S>; 3]; 4],
-    [a, b, c, d]: &mut Buffers<R>,
+    buffers: &mut Buffers<R>,
 ) {
-    add_rows::<R, S>(simd, changes[0], a);
-    add_rows::<R, S>(simd, changes[1], b);
-    add_rows::<R, S>(simd, changes[2], c);
-    add_rows::<R, S>(simd, changes[3], d);
+    add_rows::<R, S>(simd, changes[0], buffers.corner_mut::<S>(0));
+    add_rows::<R, S>(simd, changes[1], buffers.corner_mut::<S>(1));
+    add_rows::<R, S>(simd, changes[2], buffers.corner_mut::<S>(2));
+    add_rows::<R, S>(simd, changes[3], buffers.corner_mut::<S>(3));
 }
 
 #[inline(always)]
-fn add_rows<R: Float, S: Simd>(simd: S, [x, y, z]: [R::Lanes<S>; 3], buffer: &mut Buffer<R>) {
+fn add_rows<R: Float, S: Simd>(simd: S, [x, y, z]: [R::Lanes<S>; 3], values: &mut [R]) {
     let changes = R::rows(simd, [x, y, z, splat::<R, S>(simd, R::ZERO)]);
-    let [a, b, c, d] = load_rows::<R, S>(simd, buffer);
+    let [a, b, c, d] = load_rows::<R, S>(simd, values);
     let moved = [
         a + changes[0],
         b + changes[1],
         c + changes[2],
         d + changes[3],
     ];
-    store_rows::<R, S>(moved, buffer);
+    store_rows::<R, S>(moved, values);
 }
 
 #[inline(always)]
-fn load_rows<R: Float, S: Simd>(simd: S, buffer: &Buffer<R>) -> [R::Lanes<S>; 4] {
+fn load_rows<R: Float, S: Simd>(simd: S, values: &[R]) -> [R::Lanes<S>; 4] {
     let lanes = R::Lanes::<S>::LEN;
-    let values = buffer.as_flattened();
     [
         R::Lanes::<S>::from_slice(simd, &values[..lanes]),
         R::Lanes::<S>::from_slice(simd, &values[lanes..2 * lanes]),
@@ -221,9 +231,8 @@ fn load_rows<R: Float, S: Simd>(simd: S, buffer: &Buffer<R>) -> [R::Lanes<S>; 4]
 }
 
 #[inline(always)]
-fn store_rows<R: Float, S: Simd>([a, b, c, d]: [R::Lanes<S>; 4], buffer: &mut Buffer<R>) {
+fn store_rows<R: Float, S: Simd>([a, b, c, d]: [R::Lanes<S>; 4], values: &mut [R]) {
     let lanes = R::Lanes::<S>::LEN;
-    let values = buffer.as_flattened_mut();
     a.store_slice(&mut values[..lanes]);
     b.store_slice(&mut values[lanes..2 * lanes]);
     c.store_slice(&mut values[2 * lanes..3 * lanes]);

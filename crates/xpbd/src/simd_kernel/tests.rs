@@ -113,7 +113,7 @@ impl<R: Float> Case<R> {
         let layout = self.layout(level);
         let pass = Pass {
             layout: &layout,
-            corners: &layout.blocks.particles,
+            corners: &layout.blocks.corners,
             positions: &[],
             multipliers,
             corrections: &[],
@@ -146,7 +146,7 @@ impl<R: Float> Case<R> {
         let layout = self.layout(level);
         let pass = Pass {
             layout: &layout,
-            corners: &layout.blocks.particles,
+            corners: &layout.blocks.corners,
             positions: &particles,
             multipliers: &[],
             corrections: &[],
