@@ -88,8 +88,8 @@ fn measure(slot: u32, corner: vec4<u32>) -> TetSums {
         first = d * d - (second + third);
     }
     let energy = 0.5 * stiffness * (first + ratio * d * d + 2.0 * slope * d);
-    // One over six volumes at rest; 0 for a tet that is too flat to be solved.
-    let per_volumes = dot(q1 * units.length, cross(q2 * units.length, q3 * units.length));
+    // One over six volumes at rest; 0 for a tet that is too flat to be solved. Its sign is that of the order of corners.
+    let per_volumes = abs(dot(q1 * units.length, cross(q2 * units.length, q3 * units.length)));
     var change = 0.0;
     if per_volumes > 0.0 {
         change = d / (6.0 * per_volumes);

@@ -4,10 +4,11 @@
 //! of a tet, the check shares no code with the update by patches. Cost: reads all arrays, O(tets).
 
 use incise_graph::Schedule;
+use incise_xpbd::OrderedTet;
 
 use super::GpuSolver;
 use super::gpu_types::NUMBERS;
-use super::layout::{ClusterMapping, THREADS};
+use super::layout::{ClusterMapping, THREADS, in_order};
 use super::tile::number_count;
 use crate::GpuError;
 
@@ -45,8 +46,16 @@ impl GpuSolver {
         }
         for color in 0..schedule.color_count() {
             for &cluster in schedule.clusters(color) {
-                for &tet in schedule.constraints(cluster) {
+                let tets = schedule.constraints(cluster);
+                let ordered = match self.cluster_mapping() {
+                    ClusterMapping::Threads => self.host.solving_order(tets),
+                    ClusterMapping::Workgroups => tets.iter().copied().map(in_order).collect(),
+                };
+                for &tet in &ordered {
                     self.check_tet(tet, &copy)?;
+                }
+                if self.cluster_mapping() == ClusterMapping::Threads {
+                    self.check_cluster(&ordered)?;
                 }
             }
         }
@@ -66,12 +75,24 @@ impl GpuSolver {
         Ok(())
     }
 
-    fn check_tet(&self, tet: u32, copy: &Copy) -> Result<(), GpuError> {
-        let wrong = |what| differs(&format!("{what} of tet {tet}"));
-        let Some(tet_slot) = self.body.layout.tet_slot(tet as usize) else {
+    /// Whether a thread solves the tets of a cluster in this order.
+    fn check_cluster(&self, ordered: &[OrderedTet]) -> Result<(), GpuError> {
+        let tet_slot = |tet: OrderedTet| self.body.layout.tet_slot(tet.tet as usize);
+        let first = ordered.first().and_then(|&tet| tet_slot(tet));
+        for (k, &tet) in ordered.iter().enumerate() {
+            if tet_slot(tet) != first.map(|first| first + k * THREADS) {
+                return differs(&format!("the order of tet {}", tet.tet));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_tet(&self, ordered: OrderedTet, copy: &Copy) -> Result<(), GpuError> {
+        let wrong = |what| differs(&format!("{what} of tet {}", ordered.tet));
+        let Some(tet_slot) = self.body.layout.tet_slot(ordered.tet as usize) else {
             return wrong("the tet_slot");
         };
-        let data = self.host.tet_data(tet);
+        let data = self.host.ordered_tet_data(ordered);
         let mut corners = copy.corners[tet_slot];
         if self.cluster_mapping() == ClusterMapping::Workgroups {
             let room = self.body.layout.depth();
@@ -110,7 +131,7 @@ impl GpuSolver {
             let groups = &copy.lists[first..first + count];
             for groups in groups.chunks(if run.tail { 1 } else { count }) {
                 for tet_slot in groups.iter().flat_map(|&group| self.tet_slots(group, copy)) {
-                    let tet = self.body.layout.tet(tet_slot) as usize;
+                    let tet = self.body.layout.tet(tet_slot).tet as usize;
                     if turn[tet].take() != Some(now) {
                         return differs(&format!("when tet {tet} is solved"));
                     }

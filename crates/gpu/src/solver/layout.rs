@@ -9,7 +9,7 @@
 //! Cost: O(tets of changed clusters and changed tets); O(tets) for another schedule or other masses.
 
 use incise_graph::{ClusterId, Schedule};
-use incise_xpbd::{Changes, Solver};
+use incise_xpbd::{Changes, OrderedTet, Solver};
 
 use super::gpu_types::TetPatch;
 use super::slots::{Moved, Slots};
@@ -60,8 +60,10 @@ pub(crate) struct Layout {
     filled: Vec<u32>,
     /// Tet -> tet slot.
     tet_slots: Vec<u32>,
-    /// Tet slot -> tet, in occupied slots.
-    tets: Vec<u32>,
+    /// Tet slot -> tet and the order of its corners, in occupied slots.
+    tets: Vec<OrderedTet>,
+    /// Tet slot -> corners on the device, in occupied slots.
+    corners: Vec<[u32; 4]>,
 }
 
 /// Changes to send to the device.
@@ -90,6 +92,7 @@ impl Layout {
             filled: Vec::new(),
             tet_slots: Vec::new(),
             tets: Vec::new(),
+            corners: Vec::new(),
         }
     }
 
@@ -124,8 +127,8 @@ impl Layout {
             .map(|tet_slot| tet_slot as usize)
     }
 
-    /// The tet in an occupied tet slot.
-    pub(crate) fn tet(&self, tet_slot: usize) -> u32 {
+    /// The tet in an occupied tet slot, with the order of its corners.
+    pub(crate) fn tet(&self, tet_slot: usize) -> OrderedTet {
         self.tets[tet_slot]
     }
 
@@ -178,7 +181,8 @@ impl Layout {
         };
         patch.regrouped = patch.is_rebuilt || !slots.is_empty();
         self.filled.resize(self.slots.slot_count(), 0);
-        self.tets.resize(self.tet_slot_count(), NONE);
+        self.tets.resize(self.tet_slot_count(), in_order(NONE));
+        self.corners.resize(self.tet_slot_count(), [NONE; 4]);
         self.tet_slots
             .resize(solver.tet_count().max(self.tet_slots.len()), NONE);
         // All slots are emptied before any is filled: a tet may have changed its slot.
@@ -207,7 +211,8 @@ impl Layout {
         Ok(tets)
     }
 
-    /// Patches changed tets in their slots; tiles with a changed tet are rebuilt.
+    /// Patches changed tets in their slots. Clusters of which a tet has other corners may have another order, so they are
+    /// filled in again, and so are tiles with a changed tet.
     fn with_changed(
         &mut self,
         mut slots: Vec<u32>,
@@ -219,6 +224,7 @@ impl Layout {
         changed.sort_unstable();
         changed.dedup();
         let known = slots.len();
+        let mut alone = Vec::new();
         for tet in changed {
             let Some(tet_slot) = self.tet_slot(tet as usize) else {
                 continue;
@@ -234,12 +240,23 @@ impl Layout {
             }
             match self.mapping {
                 // A removed tet is in no schedule, so its slot is among those already patched.
-                ClusterMapping::Threads => patch.tets.push(filled_in(tet_slot, tet, solver)),
+                ClusterMapping::Threads => {
+                    let filled = filled_in(tet_slot, self.tets[tet_slot], solver);
+                    if filled.corners == self.corners[tet_slot] {
+                        alone.push((slot, filled));
+                    } else {
+                        slots.push(slot);
+                    }
+                }
                 ClusterMapping::Workgroups => slots.push(slot),
             }
         }
         slots.sort_unstable();
         slots.dedup();
+        alone.retain(|(slot, _)| slots.binary_search(slot).is_err());
+        patch
+            .tets
+            .extend(alone.into_iter().map(|(_, filled)| filled));
         slots
     }
 
@@ -247,16 +264,18 @@ impl Layout {
     fn empty(&mut self, slot: u32) {
         for k in 0..self.filled[slot as usize] as usize {
             let tet_slot = self.tet_slot_of(slot, k);
-            let tet = &mut self.tet_slots[self.tets[tet_slot] as usize];
+            let tet = &mut self.tet_slots[self.tets[tet_slot].tet as usize];
             if *tet == index(tet_slot) {
                 *tet = NONE;
             }
         }
     }
 
-    fn put(&mut self, tet: u32, tet_slot: usize) {
-        self.tet_slots[tet as usize] = index(tet_slot);
+    fn put(&mut self, tet: OrderedTet, filled: &TetPatch) {
+        let tet_slot = filled.tet_slot as usize;
+        self.tet_slots[tet.tet as usize] = filled.tet_slot;
         self.tets[tet_slot] = tet;
+        self.corners[tet_slot] = filled.corners;
     }
 
     /// Fills a cluster slot with the tets of its cluster, and clears the tet slots behind them.
@@ -265,19 +284,19 @@ impl Layout {
         let tets = cluster.map_or(&[][..], |cluster| schedule.constraints(cluster));
         match self.mapping {
             ClusterMapping::Threads => {
-                for (k, &tet) in tets.iter().enumerate() {
-                    let tet_slot = self.tet_slot_of(slot, k);
-                    self.put(tet, tet_slot);
-                    patch.tets.push(filled_in(tet_slot, tet, solver));
+                for (k, tet) in solver.solving_order(tets).into_iter().enumerate() {
+                    let filled = filled_in(self.tet_slot_of(slot, k), tet, solver);
+                    self.put(tet, &filled);
+                    patch.tets.push(filled);
                 }
             }
             ClusterMapping::Workgroups if tets.is_empty() => {}
             ClusterMapping::Workgroups => {
                 let tile = Tile::new(tets, |tet| solver.tet_particles(tet as usize));
                 for (k, (tet, corners)) in tile.tets().enumerate() {
-                    let tet_slot = self.tet_slot_of(slot, k);
-                    self.put(tet, tet_slot);
-                    let filled = filled_in(tet_slot, tet, solver);
+                    let tet = in_order(tet);
+                    let filled = filled_in(self.tet_slot_of(slot, k), tet, solver);
+                    self.put(tet, &filled);
                     patch.tets.push(TetPatch { corners, ..filled });
                 }
                 patch.tiles.push((slot, tile));
@@ -293,8 +312,14 @@ impl Layout {
     }
 }
 
-fn filled_in(tet_slot: usize, tet: u32, solver: &Solver<f32>) -> TetPatch {
-    let data = solver.tet_data(tet);
+/// A tet with its corners in their own order.
+pub(crate) fn in_order(tet: u32) -> OrderedTet {
+    let slots = [0, 1, 2, 3];
+    OrderedTet { tet, slots }
+}
+
+fn filled_in(tet_slot: usize, tet: OrderedTet, solver: &Solver<f32>) -> TetPatch {
+    let data = solver.ordered_tet_data(tet);
     let [ratio, gamma, damping] = data.constants;
     TetPatch {
         tet_slot: index(tet_slot),
