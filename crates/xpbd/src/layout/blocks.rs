@@ -129,6 +129,12 @@ impl<R: Float> Blocks<R> {
         [0, 1, 2, 3].map(|k| (4 * block + k) * lanes + R::row(lane, lanes))
     }
 
+    /// Whether the bit of a corner in `changed` is set.
+    pub(super) fn is_changed(&self, corner: usize) -> bool {
+        let corners = 4 * self.lanes;
+        self.changed[corner / corners] & (1 << (corner % corners)) != 0
+    }
+
     /// Whether the corners of the tet in a slot are these, in the order that they were filled in.
     pub(super) fn has_corners(&self, slot: usize, corners: [u32; 4]) -> bool {
         let known = self.corners_of(slot).map(|i| self.corners[i]);

@@ -72,7 +72,20 @@ impl<R: Float> Layout<R> {
                 return wrong("color", color);
             }
         }
-        // Each tet has been found in a lane of its own; nothing else is solved.
+        // Each tet has been found in a lane of its own; nothing else is solved or moved.
+        let empty = |slot: &usize| {
+            let (block, lane) = (slot / self.blocks.lanes, slot % self.blocks.lanes);
+            self.blocks.active[block] & (1 << lane) == 0
+        };
+        let mut slots = (0..self.blocks.tets.len()).filter(empty);
+        let moves = |&slot: &usize| {
+            let at = self.blocks.corners_of(slot);
+            at.into_iter()
+                .any(|i| self.blocks.is_changed(i) || self.blocks.corners[i] != 0)
+        };
+        if let Some(slot) = slots.find(moves) {
+            return wrong("lane without a tet", slot);
+        }
         let active: u32 = self
             .blocks
             .active
@@ -110,11 +123,12 @@ impl<R: Float> Layout<R> {
         for block in range.clone() {
             let slot = block * blocks.lanes + lane;
             let at = blocks.corners_of(slot);
-            let is_changed = at.map(|i| {
-                let bit = i - 4 * block * blocks.lanes;
-                blocks.changed[block] & (1 << bit) != 0
-            });
+            let is_changed = at.map(|i| blocks.is_changed(i));
             if is_changed != [false; 4] && (block == range.start || !is_active(block)) {
+                return false;
+            }
+            let is_other = |k: usize| held[k].is_some_and(|(p, _)| p != blocks.corners[at[k]]);
+            if is_active(block) && (0..4).any(|k| is_other(k) != is_changed[k]) {
                 return false;
             }
             let comes = |k: usize| is_changed[k] || block == range.start;

@@ -161,6 +161,60 @@ fn a_touched_tet_is_filled_in_once() {
     assert_eq!(plan.update(), 5);
 }
 
+/// A tet with other corners may give its cluster another order.
+#[test]
+fn a_tet_with_other_corners_fills_in_its_cluster() {
+    let mut plan = Plan::new(100);
+    let relinked = |tet: u32| {
+        let mut now = ingredients(tet);
+        if tet == 7 {
+            now.tet.particles = [7, 9, 1_000, 8];
+        }
+        now
+    };
+    plan.layout.touch(7);
+    assert!(plan.layout.check(&plan.schedule, relinked).is_err());
+    let filled = plan
+        .layout
+        .update(&plan.schedule, LANES, true, Vec::new, relinked);
+    assert_eq!(filled, 5);
+    plan.layout.check(&plan.schedule, relinked).unwrap();
+    let mut rebuilt = Layout::default();
+    rebuilt.update(&plan.schedule, LANES, true, Vec::new, relinked);
+    assert_eq!(plan.layout.blocks.corners, rebuilt.blocks.corners);
+    assert_eq!(plan.layout.blocks.changed, rebuilt.blocks.changed);
+    assert_eq!(plan.layout.blocks.orders, rebuilt.blocks.orders);
+}
+
+/// The check finds each wrong bit of the masks, one corner in the slot of another, and a corner that is another particle.
+#[test]
+fn the_check_finds_corners_that_are_not_moved() {
+    let plan = Plan::new(100);
+    plan.layout.check(&plan.schedule, ingredients).unwrap();
+    let moved = plan.layout.blocks.changed.iter();
+    let moved: u32 = moved.map(|bits| bits.count_ones()).sum();
+    // Clusters are strips of five.
+    assert_eq!(moved, 4 * 100);
+    for block in (0..plan.layout.blocks.len()).step_by(3) {
+        for bit in 0..4 * LANES {
+            let mut wrong = plan.layout.clone();
+            wrong.blocks.changed[block] ^= 1 << bit;
+            assert!(
+                wrong.check(&plan.schedule, ingredients).is_err(),
+                "{block} {bit}"
+            );
+            let mut wrong = plan.layout.clone();
+            let corners = &mut wrong.blocks.corners[4 * LANES * block..4 * LANES * (block + 1)];
+            corners.swap(bit, (bit + LANES) % (4 * LANES));
+            let is_same = corners[bit] == corners[(bit + LANES) % (4 * LANES)];
+            assert!(
+                is_same || wrong.check(&plan.schedule, ingredients).is_err(),
+                "{block} {bit}"
+            );
+        }
+    }
+}
+
 /// Another schedule, even an equal one, rebuilds the layout.
 #[test]
 fn another_schedule_is_laid_out() {
