@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0xd7c4_3c78_8d2d_43c8),
-        (Precision::F64, 0xbaba_0eca_5e0f_0f18),
+        (Precision::F32, 0x73e3_be73_a7ed_ac8d),
+        (Precision::F64, 0x85f8_2eb0_7a28_b950),
     ] {
         scene.solver.precision = precision;
         for threads in 1..=3 {
