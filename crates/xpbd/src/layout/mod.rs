@@ -14,7 +14,7 @@
 //! were not named rebuilds all.
 //!
 //! Cost: to build, O(tets), and O(particles log particles) for their order; to update, O(changed clusters and marked
-//! tets), amortized. 96 bytes a tet in single precision.
+//! tets), amortized. 101 bytes a tet in single precision.
 
 mod blocks;
 mod check;
