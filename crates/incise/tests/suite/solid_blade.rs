@@ -440,7 +440,7 @@ fn a_blade_below_the_force_indents() {
             continue;
         }
         // Where little of the edge is in a tet, it slips a little.
-        assert!(parted.work < 1e-5 * toughness * 0.06 * 0.024, "{parted:?}");
+        assert!(parted.work < 1e-3 * toughness * 0.06 * 0.024, "{parted:?}");
         let last = pushes[pushes.len() - 1];
         assert!(last > 3.0 && last < 0.5 * toughness * 0.06, "{last}");
         assert!(
