@@ -76,7 +76,8 @@ pub struct SolverSpec {
     #[serde(skip_serializing_if = "Integrator::is_default")]
     #[schemars(extend("default" = Integrator::default()))]
     pub integrator: Integrator,
-    /// Clustering of the tets: `none`, `serial:K` or `pressure:K`, with K tets a cluster.
+    /// Clustering of the tets: `none`, `serial:K` or `pressure:K`, with K tets a cluster. `serial` is that of the paper;
+    /// `pressure` takes eight times as long to build, needs half the colors and solves faster.
     pub clustering: String,
     /// Merge clusters that a cut leaves small with their neighbors. A cut then costs a little more and frames after
     /// many cuts cost less; without it clusters shrink and colors grow with every cut, as in the paper.
@@ -121,7 +122,7 @@ impl Default for SolverSpec {
             chebyshev_start: 10,
             two_level: false,
             integrator: Integrator::Bdf2,
-            clustering: "serial:10".to_owned(),
+            clustering: "pressure:10".to_owned(),
             merge_clusters: true,
             recluster: None,
             coloring: "auto".to_owned(),

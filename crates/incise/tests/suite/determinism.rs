@@ -79,8 +79,8 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, golden) in [
-        (Precision::F32, 0x73e3_be73_a7ed_ac8d),
-        (Precision::F64, 0x85f8_2eb0_7a28_b950),
+        (Precision::F32, 0xf588_7e86_2bcf_cd37),
+        (Precision::F64, 0xdbd5_7f7c_6c8d_9852),
     ] {
         scene.solver.precision = precision;
         for threads in 1..=3 {

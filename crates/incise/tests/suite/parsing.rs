@@ -32,7 +32,7 @@ fn defaults_are_the_documented_ones() {
     );
     assert_eq!(
         (solver.clustering.as_str(), solver.coloring.as_str()),
-        ("serial:10", "auto")
+        ("pressure:10", "auto")
     );
     assert_eq!(
         (solver.precision, solver.kappa_limit),

@@ -459,7 +459,7 @@ fn a_blade_below_the_force_indents() {
             simulation.step().unwrap();
         }
         assert_eq!(simulation.blade_force(stroke).unwrap().force, DVec3::ZERO);
-        for _ in 0..300 {
+        for _ in 0..600 {
             simulation.step().unwrap();
         }
         let rest = simulation.mesh().positions.iter();
