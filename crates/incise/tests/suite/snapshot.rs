@@ -142,7 +142,10 @@ fn clusters_under_way_are_taken_in_their_frame() {
     assert!(first.any(|cut| cut), "no clusters are worn");
     let snapshot = simulation.snapshot().unwrap();
     let then = frames(&mut simulation);
-    assert!(then[..2] == [0, 0] && then.iter().any(|&n| n > 0), "{then:?}");
+    assert!(
+        then[..2] == [0, 0] && then.iter().any(|&n| n > 0),
+        "{then:?}"
+    );
     simulation.restore(&snapshot).unwrap();
     assert_eq!(frames(&mut simulation), then);
     let first = u32::try_from(simulation.report().frame + 1 - 6).unwrap();
