@@ -5,22 +5,27 @@
 //! no search, are evaluated each frame. The solver takes the plain records and decides in each substep which of them
 //! act.
 //!
-//! Of the candidates, those are listed that the frame may bring together. How far to look ahead is known by vertex: the
-//! motion of a part as a whole towards others, and what the vertex moves beside it. So a fast corner of a sliver looks
-//! far, and what rests beside it does not. What none of the particles involved can change is not listed unless it overlaps.
+//! How far the search looks is known for each vertex and triangle: a skin, and what the frame brings the two closer at
+//! their present velocities. So a fast corner of a sliver looks far, and what falls or bends beside it does not. Of the
+//! candidates, those are listed that the frame may bring together. What none of the particles involved can change is not
+//! listed unless it overlaps.
 //!
-//! What is near is known by parts: the pieces of all bodies. Two parts whose boxes are out of reach of each other do not
-//! matter to each other, however fast they part or pass, and a part that turns as a whole does not approach itself.
+//! Vertices are searched for one by one, when the motion of the vertex or of a triangle near it has used up the skin.
+//! Motion is measured beside that of parts, the pieces of all bodies: a part that falls or turns as a whole does not
+//! approach itself, and two parts whose boxes are out of reach of each other do not matter to each other. Where two parts
+//! have used up the skin as a whole, those of their vertices are searched for that are near the other part. The search
+//! looks twice as far as what counts as near for the frame, since bodies at rest shake by less than that.
 //!
 //! The decision to search again depends on positions, velocities and frame time only, so results are the same for any
 //! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
 //! distance and face.
 //!
-//! Cost: an update without a search is three passes over the surface vertices, and one over the candidates and the twins; a
-//! search is a refit of the trees and a query for each surface vertex and each feature edge, on all threads; a delta costs what the boundary lost and
-//! gained. The first search also looks for vertices that start inside of other parts, among all tets. The search after a
-//! cut builds a tree over the new triangles, and over all of them once these are more than a
-//! quarter.
+//! Cost: an update without a search is three passes over the surface vertices, and one over the candidates and the
+//! twins. A search is a refit of the trees, a query for each vertex that is due and for each feature edge, one for each
+//! triangle that has moved, and a short one for each other vertex of parts that have, on all threads but for the triangles. A
+//! delta costs what the boundary lost and gained. The first search also looks for vertices that start inside of other
+//! parts, among all tets. The search after a cut is for all vertices; it builds a tree over the new triangles, and over all
+//! of them once these are more than a quarter.
 
 use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta, CuttableMesh};
@@ -28,17 +33,19 @@ use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
 use crate::ContactError;
+use crate::ahead::{Lookout, Near, Reach};
 use crate::edges::{EdgeContact, FeatureEdges, turn};
 use crate::face::FaceContact;
 use crate::index::{NONE, index};
 use crate::normals::{Owner, PlacedTriangle, Shape};
 use crate::pairs::{FreshPairs, PairContact};
-use crate::parts::Part;
-use crate::query::{Found, Query};
+use crate::parts::{Motion, Part};
+use crate::query::{Found, Query, turn_away};
+use crate::reserve::Reserve;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};
-use crate::tree::{Box32, TriangleTree};
+use crate::tree::{Around, Box32, Item, TriangleTree};
 use crate::walk::Barycentric;
 
 /// New triangles as a fraction of those in the main tree beyond which that is built again.
@@ -47,15 +54,28 @@ const FRESH: usize = 4;
 const PARALLEL: usize = 512;
 /// A candidate whose vertex has moved along its triangle by this in barycentric coordinates is searched for again.
 const SLID: f64 = 0.5;
-/// It has to have moved by this fraction of the skin at least: on a sliver half a barycentric coordinate is nothing.
+/// It has to have moved by this fraction of the near skin at least: on a sliver half a barycentric coordinate is nothing.
 const SLID_SKIN: f64 = 0.5;
-/// A vertex inside that has gone deeper by this fraction of the reach is searched for again, before it gets out of reach.
-const DEEPER: f64 = 0.25;
+/// A vertex inside that has gone deeper by this fraction of the near skin is searched for again, before it gets out of reach.
+const DEEPER: f64 = 0.5;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
 const BEYOND: f64 = 0.25;
-/// Candidates are listed that are apart by this fraction of the skin more than the frame may bring them together: what
+/// Candidates are listed that are apart by this fraction of the near skin more than the frame may bring them together: what
 /// speeds up within the frame may come further.
 const SPARE: f64 = 0.5;
+/// The search looks ahead in time by so many times the distance by which a frame may bring surfaces together before it is
+/// divided: a few vertices may be faster.
+const FURTHER: f64 = 4.0;
+/// A frame is divided if more than this part of the vertices of a piece close in on what is near them by more than that
+/// distance,
+const FAST: f64 = 0.01;
+/// or parts near each other move by so many times the distance relative to each other as a whole: most of that may be
+/// sliding.
+const WHOLE: f64 = 2.0;
+/// Where more than this part of all vertices have moved out of their reserve, all are searched for.
+const MOST: f64 = 0.02;
+/// The part of the skin within which surfaces count as near. The rest saves searches: bodies at rest shake by less.
+const NEAR: f64 = 0.5;
 
 /// What an update changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -146,17 +166,16 @@ pub struct ContactDetector {
     features_are_due: bool,
     /// The vertices inside another part, ascending, each with the tet that contains it.
     inside: Vec<(ParticleId, TetId)>,
-    deep: usize,
-    buried: usize,
+    /// The vertices inside another part without a triangle near them, ascending, each with whether it has no way out.
+    deep: Vec<(ParticleId, bool)>,
+    /// How many vertices the last update searched for.
+    searched: usize,
     /// The surface vertices, ascending.
     vertices: Vec<u32>,
     /// The piece of each of them.
     parts: Vec<u32>,
-    /// Where they were at the last search.
-    searched_at: Vec<DVec3>,
-    /// How far the last search reached in m.
-    reach: f64,
-    /// Whether the next update has to search.
+    reserve: Reserve,
+    /// Whether the next update has to search for all vertices.
     search_is_due: bool,
     /// Whether the next search has to look for vertices inside of other parts everywhere. Later ones know which they
     /// are: a vertex gets inside through the outer tets, which the search looks at.
@@ -175,8 +194,20 @@ struct Room {
     last_edges: Vec<EdgeContact>,
     last_pairs: Vec<PairContact>,
     last_inside: Vec<(ParticleId, TetId)>,
+    last_candidates: Vec<FaceContact>,
+    last_sightings: Vec<Sighting>,
+    last_deep: Vec<(ParticleId, bool)>,
     /// By particle.
-    ahead: Vec<Ahead>,
+    due: Vec<Due>,
+    /// By particle the way that it goes in the frame.
+    steps: Vec<DVec3>,
+    retired: Vec<u32>,
+    /// By piece how many vertices ask for two parts of a frame, and for four.
+    fast: Vec<[u32; 2]>,
+    /// The numbers of the surface vertices in the order of the triangles of the trees, in which those in a row look at the
+    /// same nodes; and the place of each in that order.
+    order: Vec<u32>,
+    place: Vec<u32>,
     /// By piece.
     parts: Vec<Part>,
     /// The pieces in the order of their boxes along x.
@@ -215,12 +246,11 @@ impl ContactDetector {
             features: FeatureEdges::default(),
             features_are_due: true,
             inside: Vec::new(),
-            deep: 0,
-            buried: 0,
+            deep: Vec::new(),
+            searched: 0,
             vertices: Vec::new(),
             parts: Vec::new(),
-            searched_at: Vec::new(),
-            reach: 0.0,
+            reserve: Reserve::default(),
             search_is_due: true,
             location_is_due: true,
             room: Room::default(),
@@ -256,6 +286,7 @@ impl ContactDetector {
         self.search_is_due = true;
         self.location_is_due = true;
         self.inside.clear();
+        self.deep.clear();
         self.face_candidates.clear();
         self.sightings.clear();
         self.edge_candidates.clear();
@@ -335,6 +366,13 @@ impl ContactDetector {
             *tet = before(*tet);
             particle.index() < delta.particles_before && tet.index() < delta.tets_before
         });
+        // Those that are left are searched for.
+        self.face_candidates.clear();
+        self.sightings.clear();
+        self.deep.clear();
+        let is_left = |p: &u32| (*p as usize) < delta.particles_before;
+        self.edge_candidates
+            .retain(|contact| contact.particles.iter().all(is_left));
         self.fresh_is_due = true;
         self.features_are_due = true;
         self.search_is_due = true;
@@ -364,30 +402,32 @@ impl ContactDetector {
         if self.search_is_due {
             self.list_vertices(state);
         }
-        let moved = self.survey(state);
-        let skin = self.settings.skin * self.mean_edge;
-        let reach = skin + moved.margin + self.settings.thickness;
-
+        self.survey(state);
         let near = self.near(state);
         std::mem::swap(&mut self.pairs, &mut self.room.last_pairs);
-        let ahead = &self.room.ahead;
-        let is_near = |[a, b]: [u32; 2], gap: f64| near.of(ahead, &[a], &[b], gap);
-        let evaluated =
-            self.fresh_pairs
-                .evaluate(&self.surface, state.positions, is_near, &mut self.pairs);
-        let searched = self.search_is_due
-            || evaluated.retired
-            || moved.needed > self.reach
-            || moved.needed.is_nan()
-            || self.has_slid(state);
+        let mut retired = std::mem::take(&mut self.room.retired);
+        retired.clear();
+        let near = Near {
+            steps: &self.room.steps,
+            ..near
+        };
+        self.fresh_pairs.evaluate(
+            &self.surface,
+            state.positions,
+            |[a, b], gap| near.of(&[a], &[b], gap),
+            |pair| retired.extend(pair),
+            &mut self.pairs,
+        );
+        let asked = self.ask(state, &retired);
+        self.room.retired = retired;
         let mut update = ContactUpdate {
-            searched,
+            searched: asked.vertices,
             ..ContactUpdate::default()
         };
-        if searched {
-            self.reach = reach;
-            self.search(state);
-        } else {
+        if asked.vertices {
+            self.search(state, asked);
+        }
+        if !asked.edges {
             turn(&mut self.edge_candidates, state.positions);
         }
         self.list(state);
@@ -397,25 +437,113 @@ impl ContactDetector {
         update
     }
 
-    /// What decides which contacts are near.
+    fn skin(&self) -> f64 {
+        self.settings.skin * self.mean_edge
+    }
+
+    fn near_skin(&self) -> f64 {
+        NEAR * self.skin()
+    }
+
+    /// How far a search looks.
+    fn reach(&self) -> Reach {
+        Reach {
+            still: self.skin() + self.settings.thickness,
+            limit: FURTHER * self.settings.reach * self.mean_edge,
+        }
+    }
+
+    /// What decides which contacts are listed, but for the steps.
     fn near<'s>(&self, state: &ContactState<'s>) -> Near<'s> {
-        let skin = self.settings.skin * self.mean_edge;
         Near {
             fixed: state.fixed,
-            spare: SPARE * skin + self.settings.thickness,
-            limit: self.settings.reach * self.mean_edge,
+            steps: &[],
+            reach: Reach {
+                still: SPARE * self.near_skin() + self.settings.thickness,
+                ..self.reach()
+            },
         }
+    }
+
+    /// Notes what is due.
+    fn ask(&mut self, state: &ContactState<'_>, retired: &[u32]) -> Asked {
+        let mut due = std::mem::take(&mut self.room.due);
+        due.clear();
+        due.resize(state.positions.len(), Due::Nothing);
+        self.searched = 0;
+        let all = self.ask_for_moved(&mut due);
+        if !all {
+            let mut look = |p: u32| due[p as usize] = due[p as usize].max(Due::Search);
+            self.each_slid(state, &mut look);
+            retired.iter().copied().for_each(look);
+        }
+        let is_due = |least: Due| self.vertices.iter().any(|&p| due[p as usize] >= least);
+        let has_moved = is_due(Due::Moved);
+        let have_parts = !self.reserve.used_up_pairs().is_empty();
+        let asked = Asked {
+            all,
+            vertices: self.search_is_due || have_parts || is_due(Due::Search),
+            edges: self.search_is_due || have_parts || has_moved || !retired.is_empty(),
+            has_moved: has_moved && !all,
+            have_parts: have_parts && !all,
+        };
+        self.room.due = due;
+        if asked.is_measured_anew() && !asked.all {
+            self.reserve.mark();
+        }
+        asked
+    }
+
+    /// Notes the vertices that have moved out of their reserve, which starts over for them; whether all are due.
+    fn ask_for_moved(&mut self, due: &mut [Due]) -> bool {
+        let skin = self.skin();
+        let parts = &self.room.parts;
+        let self_contact = self.settings.self_contact;
+        let is_asked = |part: usize| self_contact || parts[part].is_near;
+        let vertices = || {
+            let parts = self.parts.iter().map(|&part| part as usize);
+            parts.zip(&self.vertices).enumerate()
+        };
+        let mut moved = 0;
+        for (i, (part, &p)) in vertices().filter(|(_, (part, _))| is_asked(*part)) {
+            let is_used_up =
+                self.reserve.is_part_empty(part) || self.reserve.is_used_up(i, part, skin);
+            if self.search_is_due || is_used_up {
+                due[p as usize] = Due::Moved;
+                moved += 1;
+            }
+        }
+        let all = moved as f64 > MOST * self.vertices.len() as f64;
+        if all {
+            for (_, (_, &p)) in vertices().filter(|(_, (part, _))| is_asked(*part)) {
+                due[p as usize] = Due::Moved;
+            }
+        }
+        for (i, &p) in self.vertices.iter().enumerate() {
+            if due[p as usize] == Due::Moved {
+                self.reserve.renew(i);
+            }
+        }
+        for part in (0..parts.len()).filter(|&part| parts[part].body != NONE) {
+            if !is_asked(part) {
+                self.reserve.empty_part(part);
+            } else if all || self.search_is_due || self.reserve.is_part_empty(part) {
+                self.reserve.renew_part(part);
+            }
+        }
+        all || self.search_is_due
     }
 
     /// Lists the candidates that the frame may bring together.
     fn list(&mut self, state: &ContactState<'_>) {
         let near = self.near(state);
         let Room {
-            ahead,
+            steps,
             last_faces,
             last_edges,
             ..
         } = &mut self.room;
+        let near = Near { steps, ..near };
         std::mem::swap(&mut self.faces, last_faces);
         std::mem::swap(&mut self.edges, last_edges);
         self.faces.clear();
@@ -423,19 +551,20 @@ impl ContactDetector {
         let faces = self.face_candidates.iter().filter(|contact| {
             let [vertex, corners @ ..] = &contact.particles;
             let gap = contact.gap(state.positions);
-            near.of(ahead, std::slice::from_ref(vertex), corners, gap)
+            near.of(std::slice::from_ref(vertex), corners, gap)
         });
         self.faces.extend(faces);
         let edges = self.edge_candidates.iter().filter(|contact| {
             let (one, other) = contact.particles.split_at(2);
-            near.of(ahead, one, other, contact.separation(state.positions))
+            near.of(one, other, contact.separation(state.positions))
         });
         self.edges.extend(edges);
     }
 
     /// Into how many equal parts the frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
-    /// surfaces that may meet in the frame may approach each other by more than the search looks ahead. O(surface
-    /// vertices + pieces²).
+    /// more than 1% of the vertices of a part close in on what is near them by more than [`ContactSettings::reach`] and half
+    /// of the skin, or if parts near each other move relative to each other as a whole by twice as much. Fewer vertices are
+    /// not worth the time: the search looks further for them. O(surface vertices + candidates + pieces²).
     ///
     /// # Panics
     /// If there are fewer positions or velocities than particles, or a delta was left out.
@@ -444,30 +573,73 @@ impl ContactDetector {
         if self.search_is_due {
             self.list_vertices(state);
         }
-        self.fit_parts(state);
-        let ahead = (self.settings.reach + self.settings.skin) * self.mean_edge;
+        let skin = self.near_skin();
+        let ahead = self.settings.reach * self.mean_edge + skin;
+        let step = |p: u32| state.velocities[p as usize] * state.frame_time;
+        let places = |p: u32| [state.positions[p as usize]; 2];
+        let parts = &mut self.room.parts;
+        fit(parts, &self.parts, &self.vertices, &self.body_of, |_, p| {
+            (places(p), [step(p), DVec3::ZERO])
+        });
         let mut most = 0.0_f64;
         let parts = self.room.parts.iter().filter(|part| part.body != NONE);
         for (i, one) in parts.clone().enumerate() {
-            if self.settings.self_contact {
-                let [_, speed] = one.within();
-                most = most.max(speed * state.frame_time);
-            }
             for other in parts.clone().skip(i + 1) {
                 let may_touch =
                     one.body == other.body || self.settings.bodies.allow(one.body, other.body);
-                let approach = one.fastest(other) * state.frame_time;
-                let around = one.bounds.widened(approach + ahead);
-                if may_touch && around.overlaps(&other.bounds) {
+                if !may_touch {
+                    continue;
+                }
+                let approach = one.approach(other, skin);
+                let around = one.bounds().widened(approach + skin);
+                if around.overlaps(other.bounds()) {
                     most = most.max(approach);
                 }
             }
         }
-        match most {
-            approach if approach <= ahead => 1,
-            approach if approach <= 2.0 * ahead => 2,
+        let by_parts = match most {
+            approach if approach <= WHOLE * ahead => 1,
+            approach if approach <= 2.0 * WHOLE * ahead => 2,
             _ => 4,
+        };
+        by_parts.max(self.intervals_of_vertices(state, ahead))
+    }
+
+    /// Into how many parts a frame should be divided for what vertices are near.
+    fn intervals_of_vertices(&mut self, state: &ContactState<'_>, ahead: f64) -> u32 {
+        let Room {
+            parts, steps, fast, ..
+        } = &mut self.room;
+        steps.clear();
+        steps.extend(state.velocities.iter().map(|v| *v * state.frame_time));
+        fast.clear();
+        fast.resize(parts.len(), [0; 2]);
+        let mut candidates = &self.face_candidates[..];
+        for (&vertex, &part) in self.vertices.iter().zip(&self.parts) {
+            let own = candidates.partition_point(|contact| contact.particles[0] <= vertex);
+            let (these, others) = candidates.split_at(own);
+            candidates = others;
+            let most = these.iter().map(|contact| {
+                let normal = contact.normal_at(state.positions);
+                let [vertex, corners @ ..] = contact.particles.map(|p| steps[p as usize]);
+                let closing = corners.map(|corner| normal.dot(corner - vertex));
+                closing.into_iter().fold(0.0, f64::max)
+            });
+            let most = most.fold(0.0, f64::max);
+            let fast = &mut fast[part as usize];
+            fast[0] += u32::from(most > ahead);
+            fast[1] += u32::from(most > 2.0 * ahead);
         }
+        let mut intervals = 1;
+        for (part, &[twice, four]) in parts.iter().zip(&*fast) {
+            let few = FAST * f64::from(part.vertices);
+            if f64::from(four) > few {
+                intervals = 4;
+            } else if f64::from(twice) > few {
+                intervals = intervals.max(2);
+            }
+        }
+        intervals
     }
 
     /// The surface vertices and their pieces.
@@ -480,105 +652,74 @@ impl ContactDetector {
             self.parts
                 .push(triangle.map_or(0, |triangle| state.pieces.piece_of(triangle.tet)));
         }
-        self.searched_at.clear();
+        self.reserve.clear();
     }
 
-    /// Finds the boxes and the motions of all parts.
-    fn fit_parts(&mut self, state: &ContactState<'_>) {
-        let parts = &mut self.room.parts;
-        let number = self.parts.iter().map(|&part| part as usize);
-        let motions = self.vertices.iter().enumerate().map(|(i, &vertex)| {
-            let x = state.positions[vertex as usize];
-            // Where a search is due there is nothing to compare with.
-            let moved = self
-                .searched_at
-                .get(i)
-                .map_or(DVec3::ZERO, |before| x - *before);
-            (x, [moved, state.velocities[vertex as usize]])
-        });
-        parts.clear();
-        parts.resize(number.clone().max().map_or(0, |most| most + 1), Part::EMPTY);
-        for ((part, &vertex), (x, moves)) in number.clone().zip(&self.vertices).zip(motions.clone())
-        {
-            parts[part].body = self.body_of[vertex as usize];
-            parts[part].add(x, moves);
-        }
-        parts.iter_mut().for_each(Part::fit);
-        for (part, (x, moves)) in number.zip(motions) {
-            parts[part].leave(x, moves);
-        }
-    }
-
-    /// Looks at all parts: how they have moved and may move towards those that they may touch and are near.
-    fn survey(&mut self, state: &ContactState<'_>) -> Moved {
-        self.fit_parts(state);
-        let limit = self.settings.reach * self.mean_edge;
-        let thickness = self.settings.thickness;
-        let widest = (self.settings.skin * self.mean_edge + limit + thickness).max(self.reach);
+    /// Looks at all parts: which are near each other, and what they and their vertices have moved by.
+    fn survey(&mut self, state: &ContactState<'_>) {
+        let Reach { still, limit } = self.reach();
+        let (skin, widest) = (self.skin(), still + limit);
         let Room {
             parts,
             sorted,
-            ahead,
+            steps,
             ..
         } = &mut self.room;
+        steps.clear();
+        steps.extend(state.velocities.iter().map(|v| *v * state.frame_time));
+        let places = |p: u32| {
+            let x = state.positions[p as usize];
+            [x, x + steps[p as usize]]
+        };
+        let reserve = &mut self.reserve;
+        fit(parts, &self.parts, &self.vertices, &self.body_of, |i, p| {
+            (places(p), reserve.moved(i, places(p)))
+        });
         sorted.clear();
         sorted.extend((0..index(parts.len())).filter(|&p| parts[p as usize].body != NONE));
-        let low = |p: &u32| parts[*p as usize].bounds.low.x;
+        let low = |p: &u32| parts[*p as usize].bounds().low.x;
         sorted.sort_unstable_by(|p, q| low(p).total_cmp(&low(q)).then(p.cmp(q)));
 
-        let mut all = Moved::default();
-        let mut meet = |[moved, speed]: [f64; 2], turned: f64| {
-            let margin = (speed * state.frame_time).min(limit);
-            let needed = moved + margin + thickness + turned * (margin + thickness);
-            all.margin = all.margin.max(margin);
-            // What is no number asks for a search.
-            all.needed = if needed.is_nan() {
-                needed
-            } else {
-                all.needed.max(needed)
-            };
-        };
+        reserve.begin_pairs(parts.len());
         for i in 0..sorted.len() {
-            let one = parts[sorted[i] as usize];
-            if self.settings.self_contact {
-                meet(one.within(), one.turned());
-            }
-            let around = one.bounds.widened(widest);
+            let first = sorted[i] as usize;
+            let one = parts[first];
+            let around = one.bounds().widened(widest);
             for &second in &sorted[i + 1..] {
-                let other = &mut parts[second as usize];
-                if other.bounds.low.x > around.high.x {
+                let second = second as usize;
+                let other = parts[second];
+                if other.bounds().low.x > around.high.x {
                     break;
                 }
                 let may_touch =
                     one.body == other.body || self.settings.bodies.allow(one.body, other.body);
-                if may_touch && around.overlaps(&other.bounds) {
-                    meet(one.towards(other, widest), other.turned());
-                    let approach = one.approach(other, widest);
-                    other.meet(approach);
-                    parts[sorted[i] as usize].meet(approach);
+                if may_touch && around.overlaps(other.bounds()) {
+                    let ahead = one.fastest(&other).min(limit);
+                    reserve.note_pair([first, second], [&one, &other], still + ahead, ahead);
+                    parts[first].is_near = true;
+                    parts[second].is_near = true;
                 }
             }
         }
-        let most = |way: f64| if way <= limit { way } else { limit };
-        ahead.resize(state.positions.len(), Ahead::default());
-        for (&part, &vertex) in self.parts.iter().zip(&self.vertices) {
-            let p = vertex as usize;
-            let part = &parts[part as usize];
-            let own = part.beside(state.positions[p], state.velocities[p]) * state.frame_time;
-            ahead[p] = Ahead {
-                own: most(own),
-                towards_others: most(part.approach_of_others() * state.frame_time),
-            };
+        reserve.end_pairs(skin);
+        for (i, (&part, &vertex)) in self.parts.iter().zip(&self.vertices).enumerate() {
+            reserve.note(i, &parts[part as usize], places(vertex));
         }
-        all
     }
 
-    /// Whether a vertex in contact is about to leave its triangle or has gone deeper.
-    fn has_slid(&self, state: &ContactState<'_>) -> bool {
-        let skin = self.settings.skin * self.mean_edge;
+    /// Calls `look` with each vertex in contact that is about to leave its triangle or has gone deeper.
+    fn each_slid(&self, state: &ContactState<'_>, mut look: impl FnMut(u32)) {
+        let skin = self.near_skin();
         let close = 0.5 * skin + self.settings.thickness;
-        let mut candidates = self.face_candidates.iter().zip(&self.sightings);
-        candidates.any(|(contact, sighting)| {
+        for (contact, sighting) in self.face_candidates.iter().zip(&self.sightings) {
+            let gap = contact.gap(state.positions);
+            if gap >= close {
+                continue;
+            }
+            if gap < 0.0 && gap < sighting.gap - DEEPER * skin {
+                look(contact.particles[0]);
+                continue;
+            }
             let [_, second, third] = beneath(contact, state.positions);
             let [before2, before3] = sighting.weights;
             let first = 1.0 - second - third;
@@ -593,20 +734,19 @@ impl ContactDetector {
             let is_beyond = beyond(first, 1.0 - before2 - before3)
                 || beyond(second, before2)
                 || beyond(third, before3);
-            let gap = contact.gap(state.positions);
-            let is_deeper = gap < 0.0 && gap < sighting.gap - DEEPER * self.reach;
-            if is_deeper {
-                return true;
+            if !(has_slid || is_beyond) {
+                continue;
             }
             let [_, x1, x2, x3] = contact.particles.map(|p| state.positions[p as usize]);
             let way = (x2 - x1) * slid[0] + (x3 - x1) * slid[1];
-            let has_moved = way.length() > SLID_SKIN * skin || !way.is_finite();
-            (has_slid || is_beyond) && has_moved && gap < close
-        })
+            if way.length() > SLID_SKIN * skin || !way.is_finite() {
+                look(contact.particles[0]);
+            }
+        }
     }
 
-    /// Finds all candidates.
-    fn search(&mut self, state: &ContactState<'_>) {
+    /// Finds all candidates that were asked for.
+    fn search(&mut self, state: &ContactState<'_>, asked: Asked) {
         self.prepare_slots(state);
         self.sync_trees(state);
         if self.features_are_due {
@@ -614,20 +754,39 @@ impl ContactDetector {
             self.features.list(&self.surface, rest);
             self.features_are_due = false;
         }
-        self.query(state);
+        if self.search_is_due || self.room.order.len() != self.vertices.len() {
+            self.order_vertices();
+        }
+        if asked.has_moved {
+            self.note_near_moved();
+        }
+        self.query(state, asked);
         self.collect(state);
         self.search_is_due = false;
     }
 
     /// Boxes and normals of the triangles at the present positions.
     fn prepare_slots(&mut self, state: &ContactState<'_>) {
-        let Room { boxes, placed, .. } = &mut self.room;
+        let Room {
+            boxes,
+            placed,
+            steps,
+            due,
+            ..
+        } = &mut self.room;
         let count = self.surface.slot_count();
         boxes.resize(count, Box32::EMPTY);
         placed.resize(count, PlacedTriangle::default());
         let (surface, body_of) = (&self.surface, &self.body_of);
         let prepare = |(slot, (bounds, placed)): (usize, (&mut Box32, &mut PlacedTriangle))| {
             (*bounds, *placed) = prepared(surface, body_of, state, index(slot));
+            let corners = surface.triangle(index(slot)).particles.map(|p| p.index());
+            let steps = corners.map(|p| steps.get(p).copied().unwrap_or_default());
+            if placed.normal == DVec3::ZERO {
+                placed.tet = Box32::EMPTY;
+            }
+            placed.steps = Box32::around(&Bounds::around(steps));
+            placed.is_marked = corners.iter().any(|&p| due.get(p) == Some(&Due::Moved));
         };
         if count < 2 * PARALLEL {
             let slots = boxes.iter_mut().zip(placed).enumerate();
@@ -649,32 +808,108 @@ impl ContactDetector {
             self.features_are_due = true;
             self.main_slots = self.surface.slot_count();
             let Room { boxes, placed, .. } = &self.room;
-            let (normal_of, part_of) = by_slot(placed);
+            let item_of = by_slot(placed);
             let all = 0..index(self.main_slots);
-            self.main.build(all, boxes, normal_of, part_of);
+            self.main.build(all, boxes, item_of);
             self.fresh.clear();
             self.fresh_is_due = false;
             return;
         }
         let Room { boxes, placed, .. } = &self.room;
-        let (normal_of, part_of) = by_slot(placed);
-        self.main.refit(boxes, normal_of);
+        let item_of = by_slot(placed);
+        self.main.refit(boxes, item_of);
         if self.fresh_is_due {
             let new = index(self.main_slots)..index(slots);
             let alive = new.filter(|&slot| self.surface.is_alive(slot));
-            self.fresh.build(alive, boxes, normal_of, part_of);
+            self.fresh.build(alive, boxes, item_of);
             self.fresh_is_due = false;
         } else {
-            self.fresh.refit(boxes, normal_of);
+            self.fresh.refit(boxes, item_of);
+        }
+    }
+
+    /// Notes the vertices that may be near a triangle that has moved and faces them, or in the tet behind it: one of the
+    /// triangles around such a vertex faces that one, too, or must not be touched.
+    fn note_near_moved(&mut self) {
+        let reach = self.reach();
+        let Room {
+            boxes, placed, due, ..
+        } = &mut self.room;
+        let mut note = |slot: u32| {
+            for p in self.surface.triangle(slot).particles {
+                due[p.index()] = due[p.index()].max(Due::Search);
+            }
+        };
+        for (slot, triangle) in (0..).zip(&*placed) {
+            if triangle.normal == DVec3::ZERO {
+                if self.surface.is_alive(slot) {
+                    note(slot);
+                }
+                continue;
+            }
+            if !triangle.is_marked {
+                continue;
+            }
+            let lookout = Lookout::new(&boxes[slot as usize], &triangle.steps, &reach);
+            let normal = Box32::at(triangle.normal.extend(0.0).as_vec4());
+            let (tet, piece) = (triangle.tet, triangle.owner.piece);
+            let is_wanted = |around: &Around| {
+                (lookout.reaches_node(around) && !turn_away(&around.normals, &normal))
+                    || around.bounds.overlaps(&tet)
+            };
+            for tree in [&self.main, &self.fresh] {
+                tree.search_where(is_wanted, |leaf| {
+                    let is_near = !turn_away(&Box32::at(leaf.normal), &normal)
+                        && lookout.reaches(&leaf.bounds, &leaf.steps);
+                    if is_near || (leaf.part != piece && leaf.bounds.overlaps(&tet)) {
+                        note(leaf.number);
+                    }
+                    true
+                });
+            }
+        }
+    }
+
+    /// Orders the vertices by the triangles of the trees.
+    fn order_vertices(&mut self) {
+        let Room { order, place, .. } = &mut self.room;
+        // By slot the place of the triangle.
+        place.clear();
+        place.resize(self.surface.slot_count(), NONE);
+        let slots = [&self.main, &self.fresh]
+            .into_iter()
+            .flat_map(TriangleTree::order);
+        for (at, &slot) in (0..).zip(slots) {
+            place[slot as usize] = at;
+        }
+        order.clear();
+        order.extend(0..index(self.vertices.len()));
+        order.sort_unstable_by_key(|&i| {
+            let vertex = ParticleId(self.vertices[i as usize]);
+            let first = self.surface.corners(vertex).next();
+            (first.map(|(slot, _)| place[slot as usize]), i)
+        });
+        place.clear();
+        place.resize(order.len(), 0);
+        for (at, &i) in (0..).zip(&*order) {
+            place[i as usize] = at;
         }
     }
 
     /// Searches for each vertex and each feature edge.
-    fn query(&mut self, state: &ContactState<'_>) {
+    fn query(&mut self, state: &ContactState<'_>, asked: Asked) {
+        let mut reach = self.reach();
+        if !asked.is_measured_anew() {
+            // What is out of this reach was out of the other one when it was last measured.
+            reach.still += self.skin();
+        }
         let Room {
             placed,
             found,
             parts,
+            steps,
+            due,
+            order,
             ..
         } = &mut self.room;
         let query = Query {
@@ -688,7 +923,8 @@ impl ContactDetector {
             trees: [&self.main, &self.fresh],
             pairs: &self.fresh_pairs,
             body_of: &self.body_of,
-            reach: self.reach,
+            steps,
+            reach,
             mean_edge: self.mean_edge,
         };
         let self_contact = self.settings.self_contact;
@@ -706,52 +942,99 @@ impl ContactDetector {
             self.location_is_due = false;
         }
         let inside = &self.inside;
-        let ask = |((&vertex, &part), found): ((&u32, &u32), &mut Found)| {
-            if is_asked(part) {
-                let vertex = ParticleId(vertex);
-                let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
+        let (vertices, parts) = (&self.vertices, &self.parts);
+        let (candidates, used_up) = (&self.face_candidates, self.reserve.used_up_pairs());
+        let of_vertex = |contact: &FaceContact| contact.particles[0];
+        let is_used_up = |pair: [u32; 2]| used_up.binary_search(&pair).is_ok();
+        let ask = |(&i, found): (&u32, &mut Found)| {
+            let part = parts[i as usize];
+            found.clear();
+            if !is_asked(part) {
+                return;
+            }
+            let vertex = ParticleId(vertices[i as usize]);
+            let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
+            let is_near_moved_part = || {
+                asked.have_parts
+                    && used_up.binary_search_by_key(&part, |[one, _]| *one).is_ok()
+                    && (candidates
+                        .binary_search_by_key(&vertex.0, of_vertex)
+                        .is_ok()
+                        || was_inside.is_ok()
+                        || query.meets(vertex, |other| is_used_up([part, other])))
+            };
+            found.is_kept =
+                !asked.all && due[vertex.index()] == Due::Nothing && !is_near_moved_part();
+            if !found.is_kept {
                 query.vertex(vertex, was_inside.ok().map(|i| inside[i].1), found);
-            } else {
-                found.clear();
             }
         };
-        found.resize(self.vertices.len(), Found::NOTHING);
+        found.resize(vertices.len(), Found::NOTHING);
         if found.len() < PARALLEL {
-            let vertices = self.vertices.iter().zip(&self.parts);
-            vertices.zip(found).for_each(ask);
+            order.iter().zip(found).for_each(ask);
         } else {
-            let vertices = self.vertices.par_iter().zip(&self.parts).zip(found);
-            vertices.with_min_len(PARALLEL / 4).for_each(ask);
+            let places = order.par_iter().zip(found);
+            places.with_min_len(PARALLEL / 4).for_each(ask);
         }
-        self.features.search(&query, &mut self.edge_candidates);
+        if asked.edges {
+            self.features.search(&query, &mut self.edge_candidates);
+        }
     }
 
     /// Makes lists of what was found for the vertices.
     fn collect(&mut self, state: &ContactState<'_>) {
         let Room {
-            found, last_inside, ..
+            found,
+            last_inside,
+            last_candidates,
+            last_sightings,
+            last_deep,
+            place,
+            ..
         } = &mut self.room;
         std::mem::swap(&mut self.inside, last_inside);
+        std::mem::swap(&mut self.face_candidates, last_candidates);
+        std::mem::swap(&mut self.sightings, last_sightings);
         self.face_candidates.clear();
         self.inside.clear();
         self.sightings.clear();
-        self.searched_at.clear();
-        (self.deep, self.buried) = (0, 0);
-        for (&vertex, found) in self.vertices.iter().zip(found) {
-            self.searched_at.push(state.positions[vertex as usize]);
-            self.face_candidates.extend_from_slice(found.contacts());
-            if found.inside != NONE {
-                self.inside.push((ParticleId(vertex), TetId(found.inside)));
+        std::mem::swap(&mut self.deep, last_deep);
+        self.deep.clear();
+        let (mut candidates, mut sightings) = (&last_candidates[..], &last_sightings[..]);
+        let mut inside = &last_inside[..];
+        for (&vertex, &place) in self.vertices.iter().zip(&*place) {
+            let found = &found[place as usize];
+            let known = candidates.partition_point(|contact| contact.particles[0] <= vertex);
+            let first = candidates.partition_point(|contact| contact.particles[0] < vertex);
+            let was_inside = inside.partition_point(|(p, _)| p.0 < vertex);
+            inside = &inside[was_inside..];
+            if found.is_kept {
+                self.face_candidates.extend(&candidates[first..known]);
+                self.sightings.extend(&sightings[first..known]);
+                self.inside
+                    .extend(inside.first().filter(|(p, _)| p.0 == vertex));
+                let was_deep = last_deep.binary_search_by_key(&ParticleId(vertex), |deep| deep.0);
+                self.deep.extend(was_deep.ok().map(|i| last_deep[i]));
+            } else {
+                self.searched += usize::from(found.is_searched);
+                self.face_candidates.extend_from_slice(found.contacts());
+                self.sightings
+                    .extend(found.contacts().iter().map(|contact| {
+                        let [_, second, third] = beneath(contact, state.positions);
+                        Sighting {
+                            weights: [second, third],
+                            gap: contact.gap(state.positions),
+                        }
+                    }));
+                if found.inside != NONE {
+                    self.inside.push((ParticleId(vertex), TetId(found.inside)));
+                }
+                if found.is_deep {
+                    self.deep.push((ParticleId(vertex), found.is_buried));
+                }
             }
-            self.deep += usize::from(found.is_deep);
-            self.buried += usize::from(found.is_buried);
-        }
-        for contact in &self.face_candidates {
-            let [_, second, third] = beneath(contact, state.positions);
-            self.sightings.push(Sighting {
-                weights: [second, third],
-                gap: contact.gap(state.positions),
-            });
+            candidates = &candidates[known..];
+            sightings = &sightings[known..];
         }
     }
 
@@ -797,26 +1080,26 @@ impl ContactDetector {
     /// them, at the last search.
     #[must_use]
     pub fn deep(&self) -> usize {
-        self.deep
+        self.deep.len()
+    }
+
+    /// How many vertices the last update searched for.
+    #[must_use]
+    pub fn searched_vertices(&self) -> usize {
+        self.searched
     }
 
     /// How many of the deep vertices have no way out within reach of the search, so that nothing pushes them out: a
     /// piece that was swallowed as a whole.
     #[must_use]
     pub fn buried(&self) -> usize {
-        self.buried
+        self.deep.iter().filter(|(_, is_buried)| *is_buried).count()
     }
 
     /// The mean edge of the surface at rest in m, as it was when the search tree was built over all triangles.
     #[must_use]
     pub fn mean_edge(&self) -> f64 {
         self.mean_edge
-    }
-
-    /// How far the last search reached in m.
-    #[must_use]
-    pub fn reach(&self) -> f64 {
-        self.reach
     }
 
     /// The surface.
@@ -873,55 +1156,66 @@ impl ContactDetector {
     }
 }
 
-/// How far a vertex may move in a frame, in m, each at most what the search looks ahead.
-#[derive(Clone, Copy, Debug, Default)]
-struct Ahead {
-    /// Beside the motion of its part as a whole.
-    own: f64,
-    /// By that motion, towards other parts near it.
-    towards_others: f64,
+/// What has to be done for a vertex.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+enum Due {
+    Nothing,
+    /// It is searched for.
+    Search,
+    /// And so is all that is near its triangles.
+    Moved,
 }
 
-/// Decides which contacts a frame may bring together.
-#[derive(Clone, Copy)]
-struct Near<'a> {
-    fixed: &'a [bool],
-    /// How far in m they may be apart beyond what the motion of the frame brings them together.
-    spare: f64,
-    /// The most in m that the search looks ahead.
-    limit: f64,
+/// What a search is for.
+#[derive(Clone, Copy, Debug)]
+struct Asked {
+    /// All vertices.
+    all: bool,
+    /// Any vertex.
+    vertices: bool,
+    edges: bool,
+    /// Whether vertices near triangles that have moved are searched for besides those that are due.
+    has_moved: bool,
+    /// Whether vertices near another part are that has moved relative to theirs.
+    have_parts: bool,
 }
 
-impl Near<'_> {
-    /// Whether the particles of one side may meet those of the other in the frame, and one of them can move. An overlap is
-    /// near in any case, so that reports tell of one that nothing can part.
-    fn of(&self, ahead: &[Ahead], one: &[u32], other: &[u32], gap: f64) -> bool {
-        let is_fixed = |p: &u32| self.fixed.get(*p as usize).copied().unwrap_or_default();
-        if one.iter().chain(other).all(is_fixed) {
-            return gap < 0.0;
-        }
-        let most = |of: &[u32]| {
-            let own = of.iter().map(|&p| ahead[p as usize].own);
-            own.fold(0.0, f64::max)
-        };
-        let towards = ahead[one[0] as usize].towards_others;
-        // What is no number is kept.
-        let is_apart = gap > self.spare + (most(one) + most(other) + towards).min(self.limit);
-        !is_apart
+impl Asked {
+    /// Whether the reserve of some vertices or parts starts over.
+    fn is_measured_anew(&self) -> bool {
+        self.all || self.has_moved || self.have_parts
     }
 }
 
-/// How parts that are near each other move, see [`ContactDetector::survey`].
-#[derive(Clone, Copy, Default)]
-struct Moved {
-    /// How much closer two of them may come in the frame in m, at most what the search looks ahead.
-    margin: f64,
-    /// How far a search must have reached in m to know of all that may come into contact in the frame.
-    needed: f64,
+/// Fits the motions of all parts; `motion` gives the places of a surface vertex by its number and its particle, and what
+/// it has moved by.
+fn fit(
+    parts: &mut Vec<Part>,
+    part_of: &[u32],
+    vertices: &[u32],
+    body_of: &[u32],
+    motion: impl Fn(usize, u32) -> ([DVec3; 2], [DVec3; 2]),
+) {
+    let number = part_of.iter().map(|&part| part as usize);
+    parts.clear();
+    parts.resize(number.clone().max().map_or(0, |most| most + 1), Part::EMPTY);
+    for (i, (part, &vertex)) in number.zip(vertices).enumerate() {
+        let part = &mut parts[part];
+        part.body = body_of[vertex as usize];
+        part.vertices += 1;
+        let (places, moved) = motion(i, vertex);
+        let step = places[1] - places[0];
+        part.steps = part.steps.union(Bounds::around([step]));
+        for (motion, (x, by)) in part.motions.iter_mut().zip(places.into_iter().zip(moved)) {
+            motion.add(x, by);
+        }
+    }
+    let motions = parts.iter_mut().flat_map(|part| &mut part.motions);
+    motions.for_each(Motion::fit);
 }
 
 /// The box of a triangle and the triangle at the present positions; the empty box and no normal if it must not be touched.
-/// The box is that of the tet behind it, so that the search also says which tets may contain a vertex.
+/// The tet behind it has a box of its own, so that the search also says which tets may contain a vertex.
 fn prepared(
     surface: &ContactSurface,
     body_of: &[u32],
@@ -933,13 +1227,13 @@ fn prepared(
     }
     let BoundaryTriangle { tet, particles, .. } = *surface.triangle(slot);
     let mut placed = PlacedTriangle {
-        normal: DVec3::ZERO,
         area: surface.area(slot, state.positions),
         corners: particles.map(|p| state.positions[p.index()]),
         owner: Owner {
             body: body_of[particles[0].index()],
             piece: state.pieces.piece_of(tet),
         },
+        ..PlacedTriangle::default()
     };
     let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
     let squared = placed.area.length_squared();
@@ -947,19 +1241,21 @@ fn prepared(
         return (Box32::EMPTY, placed);
     }
     placed.normal = placed.area / squared.sqrt();
-    (Box32::around(&Bounds::around(corners)), placed)
+    placed.tet = Box32::around(&Bounds::around(corners));
+    (Box32::around(&Bounds::around(placed.corners)), placed)
 }
 
-/// What a tree asks of triangles, by slot: their normals and their pieces.
-fn by_slot(
-    placed: &[PlacedTriangle],
-) -> (
-    impl Fn(u32) -> DVec3 + Copy + '_,
-    impl Fn(u32) -> u32 + Copy + '_,
-) {
-    let normal_of = |slot: u32| placed[slot as usize].normal;
-    let part_of = |slot: u32| placed[slot as usize].owner.piece;
-    (normal_of, part_of)
+/// What a tree takes over of triangles, by slot.
+fn by_slot(placed: &[PlacedTriangle]) -> impl Fn(u32) -> Item + Copy + '_ {
+    |slot: u32| {
+        let placed = &placed[slot as usize];
+        Item {
+            normal: placed.normal,
+            tet: placed.tet,
+            steps: placed.steps,
+            part: placed.owner.piece,
+        }
+    }
 }
 
 /// A tree over all tets that are not flat or inverted, by their numbers. O(n log n).
@@ -975,7 +1271,7 @@ fn tree_of_tets(state: &ContactState<'_>) -> TriangleTree {
     });
     let boxes: Vec<Box32> = boxes.collect();
     let mut tree = TriangleTree::default();
-    tree.build(0..index(boxes.len()), &boxes, |_| DVec3::ZERO, |_| 0);
+    tree.build(0..index(boxes.len()), &boxes, |_| Item::PLAIN);
     tree
 }
 

@@ -8,12 +8,14 @@
 //!
 //! 1. they share no particle, no live pair of a fresh cut connects them, and their parts may touch;
 //! 2. both are convex at present, and their directions differ by more than 3°: what is parallel is touched at vertices;
-//! 3. they are within reach of each other;
+//! 3. they are within reach of each other, which grows with the speed at which they may approach, or have passed each
+//!    other before;
 //! 4. the plane through both directions parts the triangles of the one from those of the other. That is the condition under
 //!    which two edges, and not a vertex and a face, are what touches: on the sphere of normals, the arc between the
 //!    triangles of one edge crosses the opposite of the other's;
-//! 5. where they have passed each other, a way through tets leads from one of the edges to the other, as for a vertex, and
-//!    goes on as far again;
+//! 5. where they have passed each other, they cross no nearer to an end of either than a tenth of how deep they are, since
+//!    otherwise that end is what touches; and a way through tets leads from one of the edges to the other, as for a vertex,
+//!    and goes on by the same length again;
 //! 6. it is one of the four nearest of either edge, those that have passed each other first, deepest first: a long edge
 //!    over a fine rim has many near it, and is held by some of them.
 //!
@@ -27,10 +29,11 @@ use glam::DVec3;
 use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
+use crate::ahead::{Lookout, approach};
 use crate::index::index;
 use crate::query::{AS_AT_REST, Query};
 use crate::surface::ContactSurface;
-use crate::tree::{Box32, TriangleTree};
+use crate::tree::{Box32, Item, Leaf, TriangleTree};
 
 /// The cosine of the angle by which the triangles of a feature edge turn at rest.
 const SHARP: f64 = 0.766;
@@ -39,8 +42,10 @@ const FLAT: f64 = 1e-3;
 const PARALLEL: f64 = 0.05;
 /// Triangles may lie beyond the plane between two edges by this sine.
 const BENT: f64 = 0.1;
-/// Edges whose closest points lie beyond their ends are no candidate if they have passed by this, in mean edges.
+/// Edges that cross beyond their ends or too near to them are no candidate if they have passed by this, in mean edges.
 const PASSED: f64 = 0.01;
+/// Nor are edges that have passed each other deeper than this many times the distance from where they cross to an end.
+const DEEP: f64 = 10.0;
 /// Candidates kept of an edge.
 const NEAREST: usize = 4;
 /// Edges that one task looks at.
@@ -163,7 +168,7 @@ struct Feature {
 }
 
 /// A feature edge at the present positions.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 struct Wedge {
     ends: [DVec3; 2],
     /// From the edge into each of the triangles, across the edge.
@@ -178,6 +183,8 @@ pub(crate) struct FeatureEdges {
     edges: Vec<Feature>,
     tree: TriangleTree,
     tree_is_due: bool,
+    #[cfg_attr(feature = "serde", serde(skip))]
+    wedges: Vec<Option<Wedge>>,
     #[cfg_attr(feature = "serde", serde(skip))]
     boxes: Vec<Box32>,
     /// What each task found: room for a search.
@@ -238,35 +245,41 @@ impl FeatureEdges {
         self.edges.len()
     }
 
-    /// All candidates, ascending by the first edge, then the second.
+    /// All candidates, ascending by the first edge, then the second; `contacts` has those of the last search.
     pub(crate) fn search(&mut self, query: &Query<'_>, contacts: &mut Vec<EdgeContact>) {
+        let known = &*contacts;
         let Self {
-            edges, boxes, tree, ..
+            edges,
+            wedges,
+            boxes,
+            tree,
+            ..
         } = self;
+        wedges.clear();
+        wedges.extend(edges.iter().map(|edge| wedge(query, edge)));
         boxes.clear();
-        boxes.extend(edges.iter().map(|edge| {
-            let is_sound = edge.slots.iter().all(|&slot| query.shape.is_sound(slot));
-            let ends = edge.ends.map(|p| query.state.positions[p as usize]);
-            if is_sound {
-                Box32::around(&Bounds::around(ends))
-            } else {
-                Box32::EMPTY
-            }
+        boxes.extend(wedges.iter().map(|wedge| match wedge {
+            Some(wedge) => Box32::around(&Bounds::around(wedge.ends)),
+            None => Box32::EMPTY,
         }));
+        let item_of = |number: u32| Item {
+            steps: steps_of(query, &edges[number as usize]),
+            ..Item::PLAIN
+        };
         if self.tree_is_due {
-            tree.build(0..index(edges.len()), boxes, |_| DVec3::ZERO, |_| 0);
+            tree.build(0..index(edges.len()), boxes, item_of);
             self.tree_is_due = false;
         } else {
-            tree.refit(boxes, |_| DVec3::ZERO);
+            tree.refit(boxes, item_of);
         }
         self.found
             .resize_with(edges.len().div_ceil(CHUNK), Vec::new);
-        let (edges, tree) = (&self.edges, &self.tree);
+        let (edges, wedges, tree) = (&self.edges, &self.wedges, &self.tree);
         let look = |(chunk, found): (usize, &mut Vec<EdgeContact>)| {
             found.clear();
             let end = edges.len().min(CHUNK * (chunk + 1));
             for first in CHUNK * chunk..end {
-                look_around(query, edges, tree, first, found);
+                look_around(query, (edges, wedges), (tree, known), first, found);
             }
         };
         if self.found.len() < 2 {
@@ -318,26 +331,66 @@ fn beyond(surface: &ContactSurface, p: ParticleId, q: ParticleId) -> Option<u32>
         .map(|(slot, _)| slot)
 }
 
-/// Appends the candidates of an edge with those after it.
+/// Appends the candidates of an edge with those after it; `known` are those of the last search.
 fn look_around(
     query: &Query<'_>,
-    edges: &[Feature],
-    tree: &TriangleTree,
+    (edges, wedges): (&[Feature], &[Option<Wedge>]),
+    (tree, known): (&TriangleTree, &[EdgeContact]),
     first: usize,
     found: &mut Vec<EdgeContact>,
 ) {
     let edge = &edges[first];
-    let Some(wedge) = wedge(query, edge) else {
+    let Some(wedge) = &wedges[first] else {
         return;
     };
     let begin = found.len();
-    let around = Bounds::around(wedge.ends).widened(query.reach);
-    tree.search(&Box32::around(&around), |leaf| {
-        if leaf.number as usize > first {
-            found.extend(contact(query, (edge, &wedge), &edges[leaf.number as usize]));
+    let bounds = Box32::around(&Bounds::around(wedge.ends));
+    let lookout = Lookout::new(&bounds, &steps_of(query, edge), &query.reach);
+    let visit = |leaf: &Leaf| {
+        if leaf.number as usize > first && lookout.reaches(&leaf.bounds, &leaf.steps) {
+            let other = leaf.number as usize;
+            if let Some(other_wedge) = &wedges[other] {
+                found.extend(contact(
+                    query,
+                    (edge, wedge),
+                    (&edges[other], other_wedge),
+                    false,
+                ));
+            }
         }
-    });
+        true
+    };
+    tree.search_where(|around| lookout.reaches_node(around), visit);
+    // Of those that have passed it before, all, however deep.
+    let from = known.partition_point(|contact| contact.particles[..2] < edge.ends[..]);
+    let known = known[from..].iter();
+    for passed in known.take_while(|contact| contact.particles[..2] == edge.ends) {
+        let [.., c, d] = passed.particles;
+        let other = edges.binary_search_by_key(&[c, d], |other| other.ends);
+        let is_deep = passed.gap(query.state.positions) < 0.0;
+        let is_new = !found[begin..]
+            .iter()
+            .any(|contact| contact.particles == passed.particles);
+        if let Ok(other) = other
+            && let Some(other_wedge) = &wedges[other]
+            && is_deep
+            && is_new
+        {
+            found.extend(contact(
+                query,
+                (edge, wedge),
+                (&edges[other], other_wedge),
+                true,
+            ));
+        }
+    }
     found[begin..].sort_unstable_by_key(|contact| contact.particles);
+}
+
+/// The box around the steps of an edge.
+fn steps_of(query: &Query<'_>, edge: &Feature) -> Box32 {
+    let steps = edge.ends.map(|p| query.steps[p as usize]);
+    Box32::around(&Bounds::around(steps))
 }
 
 /// An edge that is sound and convex at present.
@@ -355,8 +408,9 @@ fn wedge(query: &Query<'_>, edge: &Feature) -> Option<Wedge> {
 
 fn contact(
     query: &Query<'_>,
-    (edge, wedge_of_edge): (&Feature, &Wedge),
-    other: &Feature,
+    (edge, one): (&Feature, &Wedge),
+    (other, two): (&Feature, &Wedge),
+    has_passed: bool,
 ) -> Option<EdgeContact> {
     let shares = |p: &u32| other.ends.contains(p);
     let mut ends = edge.ends.iter();
@@ -367,17 +421,19 @@ fn contact(
     if !query.may_touch_each_other(tets) {
         return None;
     }
-    let (one, two) = (wedge_of_edge, wedge(query, other)?);
     let [p, q] = closest_on_segments(one.ends, two.ends);
     let distance = p.distance(q);
-    if distance > query.reach || distance.is_nan() {
+    let reach = query
+        .reach
+        .of(approach(query.steps, &edge.ends, &other.ends));
+    if (distance > reach && !has_passed) || distance.is_nan() {
         return None;
     }
     let normal = across(one.ends[1] - one.ends[0], two.ends[1] - two.ends[0])?;
     // The first edge lies above the second, with its triangles going up and those of the second going down.
     let is_above = |normal: DVec3| {
         let up = |wedge: &Wedge| wedge.inward.map(|inward| inward.dot(normal));
-        up(one).iter().all(|up| *up >= -BENT) && up(&two).iter().all(|up| *up <= BENT)
+        up(one).iter().all(|up| *up >= -BENT) && up(two).iter().all(|up| *up <= BENT)
     };
     let normal = match [is_above(normal), is_above(-normal)] {
         [true, false] => normal,
@@ -392,7 +448,7 @@ fn contact(
     };
     let gap = contact.gap(query.state.positions);
     if gap >= 0.0 {
-        return Some(contact);
+        return (distance <= reach).then_some(contact);
     }
     if query.body_of[a as usize] == query.body_of[c as usize] {
         // At rest parts do not overlap: edges that have passed each other there are those of a wall.
@@ -405,8 +461,10 @@ fn contact(
             return None;
         }
     }
-    let parts = on_lines(one.ends, two.ends);
-    let meet = parts.iter().all(|part| (0.0..=1.0).contains(part));
+    // How far inside of both edges they cross. What is much deeper than that touches with the end, which is less deep.
+    let [first, second] = on_lines(one.ends, two.ends);
+    let inside = |part: f64, [a, b]: [DVec3; 2]| part.min(1.0 - part) * a.distance(b);
+    let meet = inside(first, one.ends).min(inside(second, two.ends)) >= -gap / DEEP;
     let is_valid = if meet {
         has_way(query, other, [q, p], edge) || has_way(query, edge, [p, q], other)
     } else {

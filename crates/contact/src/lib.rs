@@ -57,6 +57,7 @@
 //! coarse mesh, or a fold of a plate, may cross another edge between its vertices. A vertex that moves by more than half
 //! the thickness of a body in one substep may pass through it.
 
+mod ahead;
 mod detector;
 mod edges;
 mod error;
@@ -66,6 +67,7 @@ mod normals;
 mod pairs;
 mod parts;
 mod query;
+mod reserve;
 mod settings;
 mod state;
 mod surface;

@@ -10,6 +10,7 @@ use incise_cutting::BoundaryTriangle;
 use incise_mesh::TrianglePart;
 
 use crate::surface::ContactSurface;
+use crate::tree::Box32;
 
 /// The body and the piece of a triangle.
 #[derive(Clone, Copy, Debug, Default)]
@@ -28,6 +29,12 @@ pub(crate) struct PlacedTriangle {
     pub(crate) area: DVec3,
     pub(crate) corners: [DVec3; 3],
     pub(crate) owner: Owner,
+    /// The box around the tet behind it; empty where there is no normal.
+    pub(crate) tet: Box32,
+    /// The box around the ways that its corners go in the frame.
+    pub(crate) steps: Box32,
+    /// Whether a corner has moved out of its reserve.
+    pub(crate) is_marked: bool,
 }
 
 /// A surface at the present positions.

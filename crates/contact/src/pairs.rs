@@ -100,13 +100,6 @@ pub struct FreshPairs {
     areas: Vec<[DVec3; 2]>,
 }
 
-/// What [`FreshPairs::evaluate`] found beside the list.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Evaluated {
-    /// Whether pairs ended.
-    pub(crate) retired: bool,
-}
-
 impl FreshPairs {
     /// The number of pairs that have not ended, those that sleep included. O(pairs).
     #[must_use]
@@ -418,15 +411,16 @@ impl FreshPairs {
         }
     }
 
-    /// Ends the pairs that have slid apart or folded, and lists the others that are near each other by their particles and
-    /// their gap, ascending by their numbers.
+    /// Ends the pairs that have slid apart or folded, for whose particles it calls `retire`, and lists the others that are
+    /// near each other by their particles and their gap, ascending by their numbers.
     pub(crate) fn evaluate(
         &mut self,
         surface: &ContactSurface,
         positions: &[DVec3],
         is_near: impl Fn([u32; 2], f64) -> bool,
+        mut retire: impl FnMut([u32; 2]),
         list: &mut Vec<PairContact>,
-    ) -> Evaluated {
+    ) {
         list.clear();
         self.areas.clear();
         self.areas.resize(self.pairs.len(), [DVec3::ZERO; 2]);
@@ -445,7 +439,6 @@ impl FreshPairs {
                 }
             }
         }
-        let mut retired = false;
         for (pair, [a, b]) in self.pairs.iter_mut().zip(&self.areas) {
             if !pair.is_live() {
                 continue;
@@ -461,7 +454,7 @@ impl FreshPairs {
             let holds = slide < pair.largest_slide && !is_folded;
             if !holds {
                 pair.is_retired = true;
-                retired = true;
+                retire(pair.particles);
             } else if is_near(pair.particles, gap) {
                 list.push(PairContact {
                     particles: pair.particles,
@@ -469,7 +462,6 @@ impl FreshPairs {
                 });
             }
         }
-        Evaluated { retired }
     }
 
     /// Compares the lists with what they are made of. O(twins) and a little more.

@@ -5,9 +5,10 @@
 //! 1. the vertex is no corner of the triangle, and no live pair of a fresh cut says the same ([`crate::FreshPairs`]);
 //! 2. their bodies may touch;
 //! 3. their sides face each other;
-//! 4. the closest point of the triangle is within reach and is a local minimum of the distance to the surface: on an
-//!    edge or a vertex no triangle around it is closer. So a flat or convex surface is touched once and a concave corner
-//!    by each of its walls. One triangle stands for all those around the edge or the vertex: the one that faces most;
+//! 4. the closest point of the triangle is within reach, which grows with the speed at which the two may approach, and is
+//!    a local minimum of the distance to the surface: on an edge or a vertex no triangle around it is closer. So a flat or
+//!    convex surface is touched once and a concave corner by each of its walls. One triangle stands for all those around
+//!    the edge or the vertex: the one that faces most;
 //! 5. outside, one of the nearest three. Inside, of those that it does not lie behind at rest, the nearest from which a
 //!    way through tets leads to the vertex without meeting one of the vertex's own tets, if its depth is less than half
 //!    of the thickness there.
@@ -18,17 +19,18 @@
 //! Sources: J. A. Bærentzen and H. Aanæs 2005 (sides); H. Chen, E. Diaz, C. Yuksel 2023 (valid ways). Cost: a search in
 //! the tree, and for each triangle found a few dozen operations.
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec4};
 use incise_cutting::FaceTag;
 use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest_on_triangle};
 
+use crate::ahead::{Lookout, Reach, approach};
 use crate::face::{FaceContact, Meeting, face_contact};
 use crate::index::NONE;
 use crate::normals::{Owner, Shape};
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
-use crate::tree::{Box32, TriangleTree};
+use crate::tree::{Around, Box32, Leaf, TriangleTree};
 use crate::walk::{Barycentric, walk};
 
 /// Sides face each other where the dot product of their unit normals is below this.
@@ -60,6 +62,9 @@ const DEEP_TETS: usize = 64;
 pub(crate) struct Found {
     contacts: [FaceContact; OUTSIDE + 1],
     count: usize,
+    /// Whether nothing was searched for, and what is known stays.
+    pub(crate) is_kept: bool,
+    pub(crate) is_searched: bool,
     /// A tet of another part that contains it; [`NONE`] if there is none.
     pub(crate) inside: u32,
     /// Whether no triangle near it says how it got there.
@@ -76,6 +81,8 @@ impl Found {
             limit: None,
         }; OUTSIDE + 1],
         count: 0,
+        is_kept: false,
+        is_searched: false,
         inside: NONE,
         is_deep: false,
         is_buried: false,
@@ -83,6 +90,8 @@ impl Found {
 
     pub(crate) fn clear(&mut self) {
         self.count = 0;
+        self.is_kept = false;
+        self.is_searched = false;
         self.inside = NONE;
         self.is_deep = false;
         self.is_buried = false;
@@ -158,7 +167,7 @@ impl<const N: usize> Nearest<N> {
 /// The outward normals of a vertex, one for each tag around it.
 struct VertexNormals {
     normals: [(FaceTag, DVec3); Self::MOST],
-    single: [Vec3; Self::MOST],
+    single: [Vec4; Self::MOST],
     count: usize,
 }
 
@@ -169,7 +178,7 @@ impl VertexNormals {
     fn new(shape: &Shape<'_>, vertex: ParticleId) -> Self {
         let mut this = Self {
             normals: [(FaceTag::Outer, DVec3::ZERO); Self::MOST],
-            single: [Vec3::ZERO; Self::MOST],
+            single: [Vec4::ZERO; Self::MOST],
             count: 0,
         };
         for (slot, _) in shape.surface.corners(vertex) {
@@ -185,7 +194,7 @@ impl VertexNormals {
         for k in 0..this.count {
             let normal = &mut this.normals[k].1;
             *normal = normal.normalize_or_zero();
-            this.single[k] = normal.as_vec3();
+            this.single[k] = normal.extend(0.0).as_vec4();
         }
         this
     }
@@ -201,7 +210,7 @@ impl VertexNormals {
 
     /// Whether a triangle does not face the vertex for sure, whatever rounding does; cheap.
     #[inline]
-    fn turn_away(&self, normal: Vec3) -> bool {
+    fn turn_away(&self, normal: Vec4) -> bool {
         let mut normals = self.single[..self.count].iter();
         self.count > 0 && normals.all(|n| n.dot(normal) >= FACING_SINGLE)
     }
@@ -209,7 +218,7 @@ impl VertexNormals {
     /// Whether no triangle faces the vertex whose normal is in a box.
     #[inline]
     fn all_turn_away(&self, normals: &Box32) -> bool {
-        let (low, high) = (Vec3::from(normals.low), Vec3::from(normals.high));
+        let (low, high) = (normals.low(), normals.high());
         let mut own = self.single[..self.count].iter();
         // The least dot product with a vector of the box.
         self.count > 0 && own.all(|&n| (n * low).min(n * high).element_sum() >= FACING_SINGLE)
@@ -223,6 +232,16 @@ impl VertexNormals {
             .map(|(_, n)| n.dot(normal));
         dots.fold(f64::INFINITY, f64::min)
     }
+}
+
+/// Whether no two unit normals in two boxes face each other, whatever rounding does.
+#[inline]
+pub(crate) fn turn_away(one: &Box32, other: &Box32) -> bool {
+    // The least dot product of two vectors in the boxes.
+    let (low, high) = (other.low(), other.high());
+    let at_low = (one.low() * low).min(one.low() * high);
+    let at_high = (one.high() * low).min(one.high() * high);
+    at_low.min(at_high).element_sum() >= FACING_SINGLE
 }
 
 /// A dot product of unit vectors rounded to a millionth, so that triangles of one plane face a vertex alike.
@@ -239,8 +258,10 @@ pub(crate) struct Query<'a> {
     pub(crate) trees: [&'a TriangleTree; 2],
     pub(crate) pairs: &'a FreshPairs,
     pub(crate) body_of: &'a [u32],
-    /// How far away a triangle may be in m.
-    pub(crate) reach: f64,
+    /// By particle the way that it goes in the frame.
+    pub(crate) steps: &'a [DVec3],
+    /// How far away a triangle may be.
+    pub(crate) reach: Reach,
     /// The mean edge of the surface.
     pub(crate) mean_edge: f64,
 }
@@ -289,6 +310,7 @@ impl Query<'_> {
     /// Writes what `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
     pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>, found: &mut Found) {
         found.clear();
+        found.is_searched = true;
         let normals = VertexNormals::new(&self.shape, id);
         let Some(vertex) = self.vertex_of(id, &normals) else {
             return;
@@ -297,19 +319,21 @@ impl Query<'_> {
         let mut outside = Nearest::<OUTSIDE>::EMPTY;
         let mut inside = Nearest::<TRIES>::EMPTY;
         let mut containing = NONE;
-        let around = Bounds::around([x]).widened(self.reach);
-        let wanted = Box32::around(&around);
+        let lookout = self.lookout(&vertex);
+        let behind = Box32::around(&Bounds::around([vertex.behind]));
         for tree in self.trees {
             // What is unsound has an empty box.
-            let is_wanted = |bounds: &Box32, around: &Box32| {
-                !normals.all_turn_away(around) || bounds.contains(vertex.behind)
+            let is_wanted = |around: &Around| {
+                (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
+                    || around.tets.overlaps(&behind)
             };
-            tree.search_where(&wanted, is_wanted, |leaf| {
+            tree.search_where(is_wanted, |leaf| {
                 let slot = leaf.number;
-                let contains = leaf.bounds.contains(vertex.behind);
-                let turns_away = normals.turn_away(leaf.normal);
-                if (turns_away && !contains) || !self.may_touch(&vertex, slot) {
-                    return;
+                let is_near =
+                    !normals.turn_away(leaf.normal) && lookout.reaches(&leaf.bounds, &leaf.steps);
+                let contains = leaf.tet.overlaps(&behind);
+                if !(is_near || contains) || !self.may_touch(&vertex, slot) {
+                    return true;
                 }
                 if contains {
                     let tet = self.shape.triangle(slot).tet;
@@ -317,16 +341,18 @@ impl Query<'_> {
                         containing = containing.min(tet.0);
                     }
                 }
-                if turns_away {
-                    return;
+                if !is_near {
+                    return true;
                 }
-                if let Some(near) = self.near(&vertex, slot) {
+                let most = f64::from(lookout.reach(&leaf.steps));
+                if let Some(near) = self.near(&vertex, slot, most) {
                     if !near.is_inside {
                         outside.insert(near);
                     } else if !self.is_as_at_rest(&vertex, near.slot, near.distance) {
                         inside.insert(near);
                     }
                 }
+                true
             });
         }
         for near in outside.iter() {
@@ -351,6 +377,75 @@ impl Query<'_> {
                 None => found.is_buried = true,
             }
         }
+    }
+
+    /// Around a vertex.
+    fn lookout(&self, vertex: &Vertex<'_>) -> Lookout {
+        let of = |x: DVec3| Box32::around(&Bounds::around([x]));
+        let step = self.steps[vertex.id.index()];
+        Lookout::new(&of(vertex.x), &of(step), &self.reach)
+    }
+
+    /// Whether a triangle of some parts that faces a vertex is within its reach, or a tet behind one contains it.
+    pub(crate) fn meets(&self, id: ParticleId, is_of_parts: impl Fn(u32) -> bool) -> bool {
+        let normals = VertexNormals::new(&self.shape, id);
+        let Some(vertex) = self.vertex_of(id, &normals) else {
+            return false;
+        };
+        let lookout = self.lookout(&vertex);
+        let behind = Box32::around(&Bounds::around([vertex.behind]));
+        let is_wanted = |around: &Around| {
+            (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
+                || around.tets.overlaps(&behind)
+        };
+        let is_near = |leaf: &Leaf| {
+            let facing = normals.facing(self.shape.normal(leaf.number));
+            let most = f64::from(lookout.reach(&leaf.steps));
+            (facing < FACING || !facing.is_finite())
+                && self.within_reach(&vertex, leaf.number, most).is_some()
+        };
+        let misses = |leaf: &Leaf| {
+            let may_be_near =
+                lookout.reaches(&leaf.bounds, &leaf.steps) && !normals.turn_away(leaf.normal);
+            let may_contain = leaf.tet.overlaps(&behind);
+            let tet = || self.shape.triangle(leaf.number).tet;
+            let is_met = (may_be_near || may_contain)
+                && is_of_parts(leaf.part)
+                && self.may_touch(&vertex, leaf.number)
+                && (may_be_near && is_near(leaf) || may_contain && self.is_inside(tet(), &vertex));
+            !is_met
+        };
+        let mut trees = self.trees.into_iter();
+        !trees.all(|tree| tree.search_where(is_wanted, misses))
+    }
+
+    /// How far away a triangle may be for a vertex.
+    fn reach_of(&self, vertex: &Vertex<'_>, slot: u32) -> f64 {
+        let corners = self.shape.triangle(slot).particles.map(|p| p.0);
+        self.reach
+            .of(approach(self.steps, &[vertex.id.0], &corners))
+    }
+
+    /// The point of a triangle that is closest to a vertex, with its distance, if it is within reach, which is at most
+    /// `most`.
+    #[inline]
+    fn within_reach(
+        &self,
+        vertex: &Vertex<'_>,
+        slot: u32,
+        most: f64,
+    ) -> Option<(ClosestPoint, f64)> {
+        let corners = self.shape.corners(slot);
+        // The plane is no further than the triangle.
+        let from = vertex.x - corners[0];
+        if self.shape.normal(slot).dot(from).abs() > most * (1.0 + ROUNDING) {
+            return None;
+        }
+        let closest = closest_on_triangle(corners, vertex.x);
+        let distance = closest.point.distance(vertex.x);
+        let is_within = distance <= self.reach.still
+            || (distance <= most && distance <= self.reach_of(vertex, slot));
+        is_within.then_some((closest, distance))
     }
 
     /// Whether the vertex may touch a triangle: it is no corner of it and their bodies may touch.
@@ -388,26 +483,16 @@ impl Query<'_> {
         }
     }
 
-    /// The triangle of a slot if the vertex may be about to touch it or has passed it.
-    fn near(&self, vertex: &Vertex<'_>, slot: u32) -> Option<Near> {
-        let face = self.shape.normal(slot);
-        let facing = vertex.normals.facing(face);
+    /// The triangle of a slot if the vertex may be about to touch it or has passed it; `most` bounds its distance.
+    fn near(&self, vertex: &Vertex<'_>, slot: u32, most: f64) -> Option<Near> {
+        let facing = vertex.normals.facing(self.shape.normal(slot));
         if facing >= FACING && facing.is_finite() {
             return None;
         }
         let x = vertex.x;
-        let corners = self.shape.corners(slot);
-        // The plane is no further than the triangle.
-        if face.dot(x - corners[0]).abs() > self.reach * (1.0 + ROUNDING) {
-            return None;
-        }
-        let ClosestPoint { point, part, .. } = closest_on_triangle(corners, x);
-        let squared = point.distance_squared(x);
-        if squared > self.reach * self.reach || squared.is_nan() {
-            return None;
-        }
+        let (closest, distance) = self.within_reach(vertex, slot, most)?;
+        let ClosestPoint { point, part, .. } = closest;
         let key = self.shape.surface.key(slot);
-        let distance = squared.sqrt();
         if part != TrianglePart::Face {
             let closer = (distance - SAME * self.mean_edge).max(0.0);
             let rank = (rounded(facing), key);
@@ -453,7 +538,7 @@ impl Query<'_> {
             apart: near.apart.filter(|_| !near.is_inside),
             is_inside: near.is_inside,
             touching: TOUCHING * self.mean_edge,
-            reach: self.reach,
+            reach: self.reach_of(vertex, near.slot),
         };
         let (contact, slot) = face_contact(&self.shape, &meeting);
         // From the outer surface it may come to be one with the cut face that the vertex was parted from.

@@ -41,10 +41,11 @@ pub struct ContactSettings {
     /// A distance in m that is kept between surfaces; the search reaches further by as much. Usually 0.
     pub thickness: f64,
     /// How far surfaces may move towards each other, in mean edges, before contacts are searched again. More means
-    /// fewer searches with longer lists. Above 0, at most 1.
+    /// fewer searches with more candidates. Above 0, at most 1.
     pub skin: f64,
-    /// The largest distance, in mean edges, that the search looks ahead in time: a frame in which surfaces approach each
-    /// other by more should be divided, see [`crate::ContactDetector::intervals`]. At least 0, at most 2.
+    /// How far, in mean edges, a frame may bring surfaces together before it is divided, see
+    /// [`crate::ContactDetector::intervals`]. The search looks ahead in time by four times as much, where something is that
+    /// fast. At least 0, at most 2.
     pub reach: f64,
 }
 
@@ -54,7 +55,7 @@ impl Default for ContactSettings {
             bodies: BodyPairs::All,
             self_contact: true,
             thickness: 0.0,
-            skin: 0.2,
+            skin: 0.4,
             reach: 0.5,
         }
     }

@@ -3,7 +3,7 @@
 //! A detector (`incise-contact`) follows the cuts of the island's mesh and lists what may touch in the frame to come:
 //! pairs of particles across fresh cuts, vertices near triangles, and sharp edges near each other. The lists are colored
 //! when their particles change and handed to the solver before the substeps, in which it decides which of them press. In a frame in which
-//! surfaces approach each other by more than the search looks ahead, the frame is divided and contacts are found again.
+//! many vertices approach other surfaces by more than half an edge, the frame is divided and contacts are found again.
 //! What pressed is summed up by pairs of pieces after the frame, for forces and for the events of contacts that begin
 //! and end.
 //!
@@ -28,8 +28,9 @@ use crate::validate::{existing, value, within};
 use crate::warning::{Warning, WarningCode};
 use crate::{Error, Scene};
 
-/// Bytes of a particle in a detector: its body, the head of its list of triangles, where it was when contacts were searched.
-const PARTICLE: usize = 4 + 4 + 24;
+/// Bytes of a particle in a detector: its body, the head of its list of triangles, where it was and where it was expected,
+/// and how it has moved beside its piece.
+const PARTICLE: usize = 4 + 4 + 48 + 48 + 24;
 /// Bytes of a triangle there: corners and tet, its places in the lists of its corners, and its part of the search tree.
 const TRIANGLE: usize = 24 + 24 + 32;
 /// Pieces that have touched do so until their gap is this part of a mean edge.

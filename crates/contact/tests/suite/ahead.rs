@@ -36,7 +36,12 @@ fn what_is_left_out_does_not_meet() {
                 )
             })
             .collect();
-        let mut scene = Scene::new(&bodies, ContactSettings::default());
+        // All vertices have moved by more than that whenever one has, so that each search is one for all.
+        let settings = ContactSettings {
+            skin: 0.1,
+            ..ContactSettings::default()
+        };
+        let mut scene = Scene::new(&bodies, settings);
         scene.cut(0, direction(seed, 9) * 0.2, direction(seed, 8));
         let edge = scene.contacts.mean_edge();
         for frame in 0..6 {
@@ -147,6 +152,7 @@ fn contacts_that_nothing_moves_are_not_listed() {
     let mut scene = two_boxes(1e-3, ContactSettings::default());
     scene.search();
     let all = scene.contacts.faces().len();
+    let contact = scene.contacts.faces()[0];
     let (edges, lower) = (scene.contacts.edges().len(), scene.particles_of(0).len());
     assert!(all > 30 && edges > 0);
     scene.fixed = (0..scene.positions.len()).map(|p| p < lower).collect();
@@ -159,7 +165,6 @@ fn contacts_that_nothing_moves_are_not_listed() {
     assert_eq!(counts(&scene), (0, 0));
     compare(&scene);
     // A particle that is let go of brings its contacts back, without a search.
-    let contact = scene.contacts.face_candidates()[0];
     for p in contact.particles {
         scene.fixed.fill(true);
         scene.fixed[p as usize] = false;
@@ -216,4 +221,111 @@ fn an_edge_has_its_nearest_contacts() {
     assert!((gap(nearest) - 1e-3).abs() < 1e-9, "{nearest:?}");
     let of_long = |contact: &&EdgeContact| contact.particles[..2] == nearest.particles[..2];
     assert_eq!(edges.iter().filter(of_long).count(), 4, "{edges:?}");
+}
+
+/// One vertex that moves is searched for, and those near its triangles, and no others.
+#[test]
+fn a_vertex_is_searched_for_alone() {
+    let mut scene = two_boxes(0.01, ContactSettings::default());
+    let edge = scene.contacts.mean_edge();
+    assert!(scene.update().searched);
+    assert!(!scene.update().searched);
+    let inner = |x: DVec3| x.x > 0.3 && x.x < 0.9 && x.y > 0.3 && x.y < 0.9;
+    let moved = (0..scene.positions.len())
+        .find(|&p| (scene.positions[p].z - 1.01).abs() < 1e-9 && inner(scene.positions[p]))
+        .unwrap();
+    scene.positions[moved].z += 0.4 * edge;
+    let update = scene.update();
+    assert!(update.searched);
+    let few = scene.contacts.searched_vertices();
+    assert!((2..60).contains(&few), "{few}");
+    // What it has moved by is known.
+    assert!(!scene.update().searched);
+    compare(&scene);
+}
+
+/// What shakes and comes back uses up no more of the skin than its farthest way, however long it goes on: vertices beside
+/// their body, and a body as a whole.
+#[test]
+fn what_shakes_in_place_is_not_searched_for_again() {
+    for turns in [false, true] {
+        let mut scene = two_boxes(0.01, ContactSettings::default());
+        let skin = scene.contacts.settings().skin * scene.contacts.mean_edge();
+        let rest = scene.positions.clone();
+        let above = scene.particles_of(1);
+        assert!(scene.update().searched);
+        let mut length = 0.0;
+        for frame in 0..200 {
+            let before = scene.positions.clone();
+            for (i, rest) in rest.iter().enumerate() {
+                let swing = (1.1 * f64::from(frame) + 6.0 * noise(1, i)).sin();
+                scene.positions[i] = *rest + direction(1, i) * (0.04 * skin * swing);
+            }
+            for &i in above.iter().filter(|_| turns) {
+                let swing = 0.02 * skin * (0.9 * f64::from(frame)).sin();
+                let about = scene.positions[i] - DVec3::new(0.6, 0.6, 1.5);
+                scene.positions[i] += swing * (DVec3::X + DVec3::Y.cross(about));
+            }
+            length += scene.positions[above[0]].distance(before[above[0]]);
+            assert!(
+                !scene.update().searched,
+                "in frame {frame}, turning {turns}"
+            );
+        }
+        assert!(length > 2.0 * skin, "{length}");
+    }
+}
+
+/// Where vertices are searched for one by one, nothing is missed that may touch within the frame: bodies that shake all
+/// over, a few vertices of them fast.
+#[test]
+fn nothing_is_missed_where_vertices_are_searched_for_alone() {
+    let (mut some, mut compared) = (0, 0);
+    let settings = ContactSettings {
+        skin: 0.2,
+        ..ContactSettings::default()
+    };
+    for seed in 0..4 {
+        let mut scene = two_boxes(0.004, settings.clone());
+        let count = scene.particles_of(0).len();
+        let all = scene.contacts.surface().vertices().count();
+        let rest = scene.positions.clone();
+        for frame in 0..60 {
+            let time = f64::from(frame) * FRAME;
+            for (i, rest) in rest.iter().enumerate() {
+                let is_fast = noise(seed, 500 + i) > 0.9;
+                let most = if is_fast { 0.03 } else { 0.004 };
+                let speed = 12.0 + 6.0 * noise(seed, i);
+                let way = direction(seed, i) * most;
+                scene.positions[i] = *rest + way * (speed * time).sin();
+                scene.velocities[i] = way * (speed * (speed * time).cos());
+                // The second body slides and rocks.
+                if i >= count {
+                    let slow = DVec3::new(0.02, 0.01, -0.002);
+                    let about = DVec3::new(-0.7, 1.0, 0.2).cross(*rest - DVec3::splat(1.5)) * 0.01;
+                    scene.positions[i] += slow * time + about * (9.0 * time).sin();
+                    scene.velocities[i] += slow + about * (9.0 * (9.0 * time).cos());
+                }
+            }
+            scene.update();
+            let searched = scene.contacts.searched_vertices();
+            some += u32::from(searched > 0 && searched < all);
+            let fresh = scene.searched_anew();
+            let skin = fresh.settings().skin * fresh.mean_edge();
+            for contact in fresh.faces() {
+                let [vertex, corners @ ..] = &contact.particles;
+                let margin = scene.reach(&[*vertex], corners) - skin;
+                if contact.gap(&scene.positions) > margin {
+                    continue;
+                }
+                compared += 1;
+                let is_known = scene.contacts.faces().iter().any(|known| {
+                    known.particles[0] == *vertex
+                        && (known.particles[1] as usize >= count) == (corners[0] as usize >= count)
+                });
+                assert!(is_known, "seed {seed}, frame {frame}: {contact:?}");
+            }
+        }
+    }
+    assert!(some > 100 && compared > 300, "{some} and {compared}");
 }

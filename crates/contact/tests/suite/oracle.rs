@@ -187,7 +187,7 @@ impl Slow<'_> {
             && to_own > -0.1
             && to_other < -0.3
             && far.0 != vertex
-            && closest.distance(x) <= self.scene.contacts.reach();
+            && closest.distance(x) <= self.scene.reach(&[vertex], &p.map(|p| p.0));
         if !is_swapped {
             return Some(own);
         }
@@ -204,7 +204,6 @@ impl Slow<'_> {
 
     fn vertex(&self, vertex: u32, fan: &[BoundaryTriangle], expected: &mut Expected) {
         let x = self.at(ParticleId(vertex));
-        let reach = self.scene.contacts.reach();
         let mut by_tag: BTreeMap<FaceTag, DVec3> = BTreeMap::new();
         for triangle in fan {
             *by_tag.entry(triangle.tag).or_default() += self.area(triangle);
@@ -226,10 +225,10 @@ impl Slow<'_> {
             }
             let closest = closest_on_triangle(self.corners(triangle), x);
             let distance = closest.point.distance(x);
-            if distance > reach {
+            let p = triangle.particles;
+            if distance > self.scene.reach(&[vertex], &p.map(|p| p.0)) {
                 continue;
             }
-            let p = triangle.particles;
             let feature: Vec<ParticleId> = match closest.part {
                 TrianglePart::Face => p.to_vec(),
                 TrianglePart::Side(k) => vec![p[usize::from(k)], p[usize::from(k + 1) % 3]],
@@ -426,7 +425,7 @@ impl Slow<'_> {
                 if meet {
                     distance = distance.min(p.distance(q));
                 }
-                if distance > self.scene.contacts.reach() {
+                if distance > self.scene.reach(ends, others) {
                     continue;
                 }
                 let is_above = |n: DVec3| {
@@ -465,9 +464,11 @@ impl Slow<'_> {
                         };
                         ways(to).iter().any(is_other) && !ways(from + (to - from) * 2.0).is_empty()
                     };
+                let room = |part: f64, a: DVec3, b: DVec3| part.min(1.0 - part) * a.distance(b);
+                let is_inside = room(lines.x, a, b).min(room(lines.y, c, d)) >= -0.1 * gap;
                 let is_valid = if gap >= 0.0 {
                     true
-                } else if meet {
+                } else if is_inside {
                     has_way(other_tets, [q, p], ends) || has_way(tets, [p, q], others)
                 } else {
                     gap > -0.01 * self.scene.contacts.mean_edge()

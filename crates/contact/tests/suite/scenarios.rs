@@ -32,7 +32,7 @@ fn a_thin_wall_does_not_touch_itself() {
     let plate = kuhn_box([12, 4, 1], DVec3::new(1.2, 0.4, 0.02));
     let mut scene = Scene::new(&[plate], ContactSettings::default());
     scene.update();
-    assert!(scene.contacts.reach() > 0.02);
+    assert!(scene.reach(&[], &[]) > 0.02);
     assert!(scene.contacts.faces().is_empty());
     for squeeze in [0.9, 0.5, 0.1] {
         for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
@@ -281,6 +281,8 @@ fn pushed_together_again() {
                 .for_each(|&p| scene.positions[p] -= away * 0.01);
             scene.update();
         }
+        // A list that was kept has all that may touch, but not all that is within reach.
+        scene.search();
         compare(&scene);
         let mut held = 0;
         for contact in scene.contacts.faces() {
@@ -333,9 +335,13 @@ fn the_nearest_way_out_of_thin_layers() {
         kuhn_box([8; 3], DVec3::splat(0.04)),
         DVec3::new(1.4, 1.55, 0.33),
     );
-    let mut scene = Scene::new(&[layers, probe], ContactSettings::default());
+    let settings = ContactSettings {
+        skin: 0.2,
+        ..ContactSettings::default()
+    };
+    let mut scene = Scene::new(&[layers, probe], settings);
     scene.update();
-    assert!(scene.contacts.reach() < 0.1, "no triangle is near");
+    assert!(scene.reach(&[], &[]) < 0.1, "no triangle is near");
     assert_eq!((scene.contacts.deep(), scene.contacts.buried()), (386, 0));
     let tops = scene.contacts.faces().iter();
     let tops = tops.filter(|c| c.normal_at(&scene.positions).z > 0.999);
@@ -467,7 +473,7 @@ fn on_several_threads() {
     };
     let one = run(1);
     assert!(one.iter().all(|contacts| contacts.faces().len() > 50));
-    assert!(one.iter().any(|contacts| contacts.edges().len() > 10));
+    assert!(one.iter().any(|contacts| contacts.edges().len() > 5));
     for threads in [2, 3] {
         let many = run(threads);
         assert!(one.iter().zip(&many).all(|(one, other)| same(one, other)));
@@ -540,14 +546,14 @@ fn when_a_search_is_due() {
     assert!(scene.update().searched);
     scene.update();
     // A fast body is looked for further away, and asks for shorter frames.
-    let reach = scene.contacts.reach();
     for p in scene.particles_of(1) {
-        scene.velocities[p].z -= 0.25 * scene.contacts.mean_edge() / FRAME;
+        scene.velocities[p].z -= 0.4 * scene.contacts.mean_edge() / FRAME;
     }
     assert!(scene.update().searched);
-    assert!(scene.contacts.reach() > reach);
+    // Those of the two sides at least.
+    assert!(scene.contacts.searched_vertices() >= 32);
     assert_eq!(scene.intervals(), 1);
-    for (speed, intervals) in [(1.0, 2), (3.0, 4), (30.0, 4)] {
+    for (speed, intervals) in [(0.5, 1), (1.0, 2), (3.0, 4), (30.0, 4)] {
         for p in scene.particles_of(1) {
             scene.velocities[p] =
                 DVec3::new(0.0, 0.0, -50.0 - speed * scene.contacts.mean_edge() / FRAME);
@@ -668,21 +674,12 @@ fn kept_lists_are_complete() {
                 continue;
             }
             kept += 1;
-            let mut fresh = scene.contacts.clone();
-            fresh.search_again();
-            fresh.update(&incise_contact::ContactState {
-                mesh: &scene.body,
-                pieces: &scene.pieces,
-                positions: &scene.positions,
-                velocities: &scene.velocities,
-                fixed: &scene.fixed,
-                frame_time: FRAME,
-            });
+            let fresh = scene.searched_anew();
             let skin = fresh.settings().skin * fresh.mean_edge();
-            let margin = fresh.reach() - skin;
             for contact in fresh.faces() {
                 let [vertex, corner, ..] = contact.particles;
                 let gap = contact.gap(&scene.positions);
+                let margin = scene.reach(&[vertex], &contact.particles[1..]) - skin;
                 if gap < -0.02 * fresh.mean_edge() || gap > margin + 0.5 * skin {
                     continue;
                 }
@@ -696,7 +693,7 @@ fn kept_lists_are_complete() {
             }
         }
     }
-    assert!(kept > 100 && compared > 100, "{kept} and {compared}");
+    assert!(kept > 100 && compared > 50, "{kept} and {compared}");
 }
 
 /// What degenerates is not touched and does no harm.

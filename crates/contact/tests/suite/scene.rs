@@ -97,6 +97,21 @@ impl Scene {
         self.contacts.update(&state)
     }
 
+    /// What a search for all vertices finds. The contacts of the scene stay as they are.
+    pub(crate) fn searched_anew(&self) -> ContactDetector {
+        let mut fresh = self.contacts.clone();
+        fresh.search_again();
+        fresh.update(&ContactState {
+            mesh: &self.body,
+            pieces: &self.pieces,
+            positions: &self.positions,
+            velocities: &self.velocities,
+            fixed: &self.fixed,
+            frame_time: self.frame_time,
+        });
+        fresh
+    }
+
     /// Into how many parts a frame is divided.
     pub(crate) fn intervals(&mut self) -> u32 {
         self.contacts.intervals(&ContactState {
@@ -109,7 +124,23 @@ impl Scene {
         })
     }
 
-    /// An update that searches.
+    /// How far apart the search looks for particles that may touch those of another group, by the rule that its
+    /// documentation gives: a skin, the thickness, and what the frame brings them closer, up to four times what a frame is divided
+    /// for.
+    pub(crate) fn reach(&self, one: &[u32], other: &[u32]) -> f64 {
+        let settings = self.contacts.settings();
+        let edge = self.contacts.mean_edge();
+        let mut approach = 0.0_f64;
+        for &p in one {
+            for &q in other {
+                let [p, q] = [p, q].map(|p| self.velocities[p as usize]);
+                approach = approach.max((p * self.frame_time).distance(q * self.frame_time));
+            }
+        }
+        settings.skin * edge + settings.thickness + approach.min(4.0 * settings.reach * edge)
+    }
+
+    /// An update that searches for all vertices.
     pub(crate) fn search(&mut self) {
         let settings = self.contacts.settings().clone();
         self.contacts.set_settings(settings).unwrap();
