@@ -942,10 +942,21 @@ impl ContactDetector {
             self.location_is_due = false;
         }
         let inside = &self.inside;
-        let (vertices, parts) = (&self.vertices, &self.parts);
+        let (vertices, all_parts, parts) = (&self.vertices, &*parts, &self.parts);
         let (candidates, used_up) = (&self.face_candidates, self.reserve.used_up_pairs());
         let of_vertex = |contact: &FaceContact| contact.particles[0];
-        let is_used_up = |pair: [u32; 2]| used_up.binary_search(&pair).is_ok();
+        // The parts that have moved relative to one.
+        let moved_beside = |part: u32| {
+            let first = used_up.partition_point(|[one, _]| *one < part);
+            let pairs = used_up[first..].iter();
+            let pairs = pairs.take_while(move |[one, _]| *one == part);
+            pairs.map(|[_, other]| *other)
+        };
+        let widest = reach.still + reach.limit;
+        let is_in_box = |other: u32, x: DVec3| {
+            let bounds = all_parts[other as usize].bounds().widened(widest);
+            bounds.overlaps(&Bounds::around([x]))
+        };
         let ask = |(&i, found): (&u32, &mut Found)| {
             let part = parts[i as usize];
             found.clear();
@@ -955,13 +966,14 @@ impl ContactDetector {
             let vertex = ParticleId(vertices[i as usize]);
             let was_inside = inside.binary_search_by_key(&vertex, |known| known.0);
             let is_near_moved_part = || {
+                let x = state.positions[vertex.index()];
                 asked.have_parts
-                    && used_up.binary_search_by_key(&part, |[one, _]| *one).is_ok()
+                    && moved_beside(part).any(|other| is_in_box(other, x))
                     && (candidates
                         .binary_search_by_key(&vertex.0, of_vertex)
                         .is_ok()
                         || was_inside.is_ok()
-                        || query.meets(vertex, |other| is_used_up([part, other])))
+                        || query.meets(vertex, |other| moved_beside(part).any(|o| o == other)))
             };
             found.is_kept =
                 !asked.all && due[vertex.index()] == Due::Nothing && !is_near_moved_part();
