@@ -335,9 +335,14 @@ impl ContactDetector {
             self.body_of.push(self.body_of[source.index()]);
         }
         let is_deleted = |tet: TetId| delta.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
-        // Other tets take over the volume of those that an improvement deletes.
+        // Other tets take over the volume of those that an improvement deletes or flips.
+        let is_flipped = |tet: TetId| {
+            let removed = delta.removed.binary_search_by_key(&tet, |gone| gone.tet);
+            delta.flipped > 0 && removed.is_ok()
+        };
         let mut inside = self.inside.iter();
-        self.location_is_due |= delta.collapsed > 0 && inside.any(|(_, tet)| is_deleted(*tet));
+        self.location_is_due |=
+            delta.is_improvement() && inside.any(|(_, tet)| is_deleted(*tet) || is_flipped(*tet));
         self.inside.retain(|(_, tet)| !is_deleted(*tet));
         for (_, tet) in &mut self.inside {
             *tet = delta.slot_after(*tet);

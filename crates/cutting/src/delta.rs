@@ -141,6 +141,8 @@ pub struct CutDelta {
     pub crumb_volume: f64,
     /// Particles that an improvement took out; 0 for cuts and removals.
     pub collapsed: usize,
+    /// Edges inside that an improvement took away by flips; 0 for cuts and removals.
+    pub flipped: usize,
     /// Snapped particles of a plane or level set that no earlier cut had snapped to, kept for undo.
     pub bent: Vec<ParticleId>,
     /// Number of opened faces that were recorded, both sides counted as one; kept for undo.
@@ -159,6 +161,12 @@ impl CutDelta {
             && self.copies.is_empty()
             && self.added.is_empty()
             && self.deleted.is_empty()
+    }
+
+    /// Returns whether the changes are those of an improvement that changed something.
+    #[must_use]
+    pub fn is_improvement(&self) -> bool {
+        self.collapsed > 0 || self.flipped > 0
     }
 
     /// Returns the number of particles after the cut.

@@ -6,13 +6,19 @@
 //! - the topology stays (link condition of Dey, Edelsbrunner, Guha and Nekhayev 1999, for the mesh with its boundary), so
 //!   no pieces are joined or lost;
 //! - no tet is inverted or nearly so, neither at rest nor in the present shape;
-//! - the smallest sine of a dihedral angle around grows, or stays above [`GOOD`];
+//! - the smallest sine of a dihedral angle around all that change together grows, or stays above [`GOOD`];
 //! - the boundary keeps its shape. Outer faces stay in their planes to rounding. A cut face stays within
 //!   [`ImproveOptions::tolerance`] of the faces that its own stroke opened, however often it is moved (module `sheets`). It
 //!   moves only together with the face opposite to it on the other side of the cut, so that one side gains what the other
 //!   loses and the volume stays to rounding. Where cuts cross, the particles of all parts that meet at a place are
 //!   therefore merged at once. A cut face whose other side is different stays in its plane. Rims and corners of cut faces
 //!   move along a rim only, the front of an unfinished cut not at all.
+//!
+//! Where a stroke may be continued, a particle on its surface is merged only into another one on the same sheet: the surface
+//! gets fewer particles and stays closed.
+//!
+//! Where no particle around can be taken out, edges inside of tets with an angle below 5 degrees are flipped (module `flips`) if
+//! the worst of the tets around them becomes better.
 //!
 //! Original particles are never taken out, so the mesh does not become coarser than it was made. Cost: each round looks
 //! at the particles around the changes of the round before, each with the tets around it and its neighbors; a call ends
@@ -27,9 +33,10 @@ use incise_mesh::{ParticleId, TetId};
 use crate::delta::{AddedTet, BoundaryTriangle, CutDelta, FaceTag, RemovedTet};
 use crate::faces::{Behind, Face, face_of};
 use crate::finite::require_positions;
+use crate::flips::Flip;
 use crate::quality::{Dihedrals, is_thin, least_sine};
 use crate::remove::fill_gaps;
-use crate::{CutError, CuttableMesh};
+use crate::{CutError, CuttableMesh, StrokeRegistry};
 
 /// Sine of a dihedral angle of 12 degrees. Tets with larger angles only are good enough to be merged into others.
 const GOOD: f64 = 0.2;
@@ -42,6 +49,10 @@ const SMOOTH: f64 = 0.5;
 const MOST_BEND: f64 = 2.0;
 /// Smallest cosine between the normals of neighboring faces of a cut; where they fold more, the cut ends.
 const FRONT: f64 = 0.0;
+/// Sine of a dihedral angle of 5 degrees. Edges of tets with a smaller one, or a larger one than 175 degrees, are flipped.
+const THIN: f64 = 0.0872;
+/// By how much of itself the smallest sine must grow in a flip.
+const GAIN: f64 = 1e-6;
 /// Particles of which the shortest are taken out first.
 const CHUNK: usize = 128;
 /// In the present shape a tet must keep this fraction of its volume at rest, or half of the smallest around it.
@@ -71,18 +82,52 @@ impl Default for ImproveOptions {
     }
 }
 
-/// Takes out particles that cuts created, from `near` on and wherever a change allows another one.
+/// Particles around which a mesh is still to be improved.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ImproveQueue {
+    /// Those that no call has looked at. They come first, so that they do not wait for those that come again and again.
+    new: Vec<ParticleId>,
+    /// Those around which a call has changed something.
+    again: Vec<ParticleId>,
+    /// Those that stay, and may have thin tets around them.
+    thin: Vec<ParticleId>,
+}
+
+impl ImproveQueue {
+    /// Appends particles, such as the corners of the tets that a stroke created ([`CutDelta::created_particles`]).
+    pub fn extend(&mut self, particles: impl IntoIterator<Item = ParticleId>) {
+        self.new.extend(particles);
+    }
+
+    /// Appends the queue of a mesh that is appended to one with so many particles: see [`CuttableMesh::append`].
+    pub fn append(&mut self, other: &Self, particles: usize) {
+        let shifted = |p: &ParticleId| ParticleId::new(particles + p.index());
+        self.new.extend(other.new.iter().map(shifted));
+        self.again.extend(other.again.iter().map(shifted));
+        self.thin.extend(other.thin.iter().map(shifted));
+    }
+
+    /// Returns whether all work is done.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.new.is_empty() && self.again.is_empty() && self.thin.is_empty()
+    }
+}
+
+/// Takes out particles that cuts created, from those in `queue` on and wherever a change allows another one, and flips edges
+/// of the thin tets that are left.
 ///
 /// # Arguments
-/// `positions` are the present positions of the particles. `near` are particles to begin with, such as the corners of
-/// the tets that a stroke created ([`CutDelta::created_particles`]); afterwards those that the next call is to begin with,
-/// none if the work is done. Particles for which `is_locked` is true stay; lock
-/// those that something else refers to and those between materials. It is given the mesh in progress, in which tets that
-/// stay have their slots from before.
+/// `positions` are the present positions of the particles. `queue` has the particles to begin with, and afterwards those that
+/// the next call is to begin with, none if the work is done. Strokes in `registry` can be continued afterwards. Particles
+/// for which `is_locked` is true stay; lock those that something else refers to and those between materials. It is given the
+/// mesh in progress, in which tets that stay have their slots from before.
 ///
 /// # Returns
 /// A delta in which the tets around the particles taken out are `removed` and `added` with other corners, each its own
-/// child, or `deleted`. The particles taken out keep their number and position but have no tet any more.
+/// child, or `deleted`; a flip does the same with the tets around an edge. The particles taken out keep their number and
+/// position but have no tet any more. Edges become longer, so that crossings of later cuts may snap further.
 ///
 /// # Errors
 /// [`CutError::Improve`] if the tolerance is out of its range; an error if `positions` has another length than the mesh
@@ -94,7 +139,9 @@ impl Default for ImproveOptions {
 /// # Example
 /// ```
 /// use glam::DVec3;
-/// use incise_cutting::{CutOptions, CuttableMesh, ImproveOptions, Plane, cut_plane, improve};
+/// use incise_cutting::{
+///     CutOptions, CuttableMesh, ImproveOptions, ImproveQueue, Plane, StrokeRegistry, cut_plane, improve,
+/// };
 /// use incise_mesh::kuhn_box;
 ///
 /// let mut body = CuttableMesh::new(kuhn_box([5; 3], DVec3::ONE))?;
@@ -104,9 +151,12 @@ impl Default for ImproveOptions {
 /// let tets = body.mesh().tets.len();
 ///
 /// let rest = body.mesh().positions.clone();
-/// let mut near = cut.created_particles();
-/// let delta = improve(&mut body, &rest, &mut near, &ImproveOptions::default(), |_, _| false)?;
-/// assert!(near.is_empty() && delta.collapsed > 0 && body.mesh().tets.len() < tets);
+/// let mut queue = ImproveQueue::default();
+/// queue.extend(cut.created_particles());
+/// let registry = StrokeRegistry::default();
+/// let options = ImproveOptions::default();
+/// let delta = improve(&mut body, &rest, &mut queue, &options, &registry, |_, _| false)?;
+/// assert!(queue.is_empty() && delta.collapsed > 0 && body.mesh().tets.len() < tets);
 /// assert_eq!(body.mesh().pieces().count, 2);
 /// assert!((body.mesh().total_volume() - 1.0).abs() < 1e-12);
 /// # Ok::<(), incise_cutting::CutError>(())
@@ -114,8 +164,9 @@ impl Default for ImproveOptions {
 pub fn improve(
     cuttable: &mut CuttableMesh,
     positions: &[DVec3],
-    near: &mut Vec<ParticleId>,
+    queue: &mut ImproveQueue,
     options: &ImproveOptions,
+    registry: &StrokeRegistry,
     is_locked: impl Fn(&CuttableMesh, ParticleId) -> bool,
 ) -> Result<CutDelta, CutError> {
     let _span = tracing::debug_span!("cutting::improve").entered();
@@ -132,12 +183,14 @@ pub fn improve(
         keeps_boundary: options.keeps_boundary,
         cuttable,
         positions,
+        registry,
         first: BTreeMap::new(),
         deleted: BTreeSet::new(),
         looked_at: Cell::new(0),
         collapsed: 0,
+        flipped: 0,
     };
-    improvement.run(near, options.max_tets, &is_locked);
+    improvement.run(queue, options.max_tets, &is_locked);
     Ok(improvement.finish())
 }
 
@@ -259,6 +312,7 @@ impl Star {
 struct Improvement<'a> {
     cuttable: &'a mut CuttableMesh,
     positions: &'a [DVec3],
+    registry: &'a StrokeRegistry,
     exact: f64,
     tolerance: f64,
     keeps_boundary: bool,
@@ -267,6 +321,7 @@ struct Improvement<'a> {
     /// Tets looked at, each time counted.
     looked_at: Cell<usize>,
     collapsed: usize,
+    flipped: usize,
 }
 
 /// The worst shapes of the tets around a particle.
@@ -297,23 +352,35 @@ impl Improvement<'_> {
         there.unwrap_or(particle).min(particle)
     }
 
-    /// Rounds until one changes nothing or the work is at its limit. Ends, since each change takes a particle out.
+    /// Rounds until one changes nothing or the work is at its limit. Ends, since each merge takes a particle out, and between
+    /// two of them each flip makes the ascending list of all sines larger.
     fn run(
         &mut self,
-        near: &mut Vec<ParticleId>,
+        queue: &mut ImproveQueue,
         max_tets: usize,
         is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
     ) {
-        near.sort_unstable();
-        near.dedup();
-        let mut round = std::mem::take(near).into_iter();
-        let mut next: BTreeSet<ParticleId> = BTreeSet::new();
+        let ImproveQueue { new, again, thin } = std::mem::take(queue);
+        let new = BTreeSet::from_iter(new);
+        let mut next: BTreeSet<ParticleId> = BTreeSet::from_iter(again);
+        next.retain(|particle| !new.contains(particle));
+        let mut thin: BTreeSet<ParticleId> = BTreeSet::from_iter(thin);
+        let (mut round, mut is_new) = (Vec::from_iter(new).into_iter(), true);
         let mut due: Vec<(f64, ParticleId)> = Vec::new();
         let mut is_over = false;
         while !is_over {
             if round.as_slice().is_empty() {
-                if next.is_empty() {
-                    return;
+                is_new = false;
+                // Flips last: they change the tets that a merge would take out.
+                while next.is_empty()
+                    && !is_over
+                    && let Some(particle) = thin.pop_first()
+                {
+                    next.extend(self.flip_around(particle, is_locked));
+                    is_over = self.looked_at.get() >= max_tets;
+                }
+                if next.is_empty() || is_over {
+                    break;
                 }
                 round = Vec::from_iter(std::mem::take(&mut next)).into_iter();
             }
@@ -340,17 +407,25 @@ impl Improvement<'_> {
                     next.insert(particle);
                     continue;
                 }
-                for to in self.take_out(particle, is_locked) {
+                let merged = self.take_out(particle, is_locked);
+                if merged.is_empty() {
+                    thin.insert(particle);
+                }
+                for to in merged {
                     next.insert(to);
                     next.extend(Star::of(self.cuttable, to).neighbors);
                 }
                 is_over = self.looked_at.get() >= max_tets;
             }
         }
-        near.extend(round);
-        near.extend(next);
-        near.sort_unstable();
-        near.dedup();
+        let rest = if is_new {
+            &mut queue.new
+        } else {
+            &mut queue.again
+        };
+        rest.extend(round);
+        queue.again.extend(next);
+        queue.thin.extend(thin);
     }
 
     /// Merges a particle into the neighbor with the best result, if there is one. Returns the particles merged into.
@@ -370,7 +445,7 @@ impl Improvement<'_> {
         }
         // Most particles that must stay are at rims and corners, which is known before their other sides are.
         let mut targets = star.targets();
-        targets.retain(|to| self.may_bend(&star, *to, true));
+        targets.retain(|to| self.may_bend(&star, *to, true) && self.keeps_surfaces(&star, *to));
         if targets.is_empty() {
             return Vec::new();
         }
@@ -385,6 +460,10 @@ impl Improvement<'_> {
                 };
                 if shapes.is_empty() {
                     shapes.extend(parts.iter().map(|part| self.shape(part)));
+                    // One part may become worse where the worst of all becomes better.
+                    let sines = shapes.iter().map(|shape| shape.sine);
+                    let worst = sines.fold(f64::INFINITY, f64::min);
+                    shapes.iter_mut().for_each(|shape| shape.sine = worst);
                 }
                 let least = best.as_ref().map_or(f64::NEG_INFINITY, |(most, _)| *most);
                 let mut quality = f64::INFINITY;
@@ -569,6 +648,15 @@ impl Improvement<'_> {
         })
     }
 
+    /// Whether the surfaces that strokes have passed and not opened stay if a particle is merged into another one, so that
+    /// later strokes can continue there.
+    fn keeps_surfaces(&self, star: &Star, to: ParticleId) -> bool {
+        let rest = &self.cuttable.mesh.positions;
+        let is_cut = |face: &FanFace| face.tag != FaceTag::Outer;
+        let ends = [star.particle, to];
+        star.fan.iter().any(is_cut) || self.registry.has_on_same_sheets(rest, ends, self.tolerance)
+    }
+
     /// Whether the cut faces around a particle stay within the tolerance of what their strokes opened if it is merged into
     /// another one.
     fn keeps_cuts(&self, star: &Star, to: ParticleId) -> bool {
@@ -739,6 +827,103 @@ impl Improvement<'_> {
             && common(&outline(star), &outline(&target)).is_empty()
     }
 
+    /// Flips edges of thin tets around a particle where the worst tet around them becomes better. Returns the corners of
+    /// those that changed.
+    fn flip_around(
+        &mut self,
+        particle: ParticleId,
+        is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
+    ) -> Vec<ParticleId> {
+        let mut changed = Vec::new();
+        let mut tets: Vec<TetId> = self.cuttable.around(particle).collect();
+        tets.sort_unstable();
+        for tet in tets {
+            // An earlier flip may have taken it away from the particle.
+            let corners = self.cuttable.mesh.tets[tet.index()];
+            if self.deleted.contains(&tet) || !corners.contains(&particle) {
+                continue;
+            }
+            let [rest, _] = self.corners(corners);
+            if least_sine(rest) >= THIN {
+                continue;
+            }
+            let mut best: Option<(f64, Flip)> = None;
+            for (i, &a) in corners.iter().enumerate() {
+                for &b in &corners[i + 1..] {
+                    for flip in Flip::of_edge(self.cuttable, tet, [a, b]) {
+                        let least = best.as_ref().map_or(0.0, |(most, _)| *most);
+                        if let Some(quality) = self.quality_of_flip(&flip, least)
+                            && self.may_flip(&flip, is_locked)
+                        {
+                            best = Some((quality, flip));
+                        }
+                    }
+                }
+            }
+            if let Some((_, flip)) = best {
+                changed.extend(flip.edge);
+                changed.extend(&flip.ring);
+                for &tet in &flip.removed {
+                    self.note(tet, true);
+                }
+                self.deleted.extend(flip.apply(self.cuttable));
+                self.flipped += 1;
+            }
+        }
+        changed
+    }
+
+    /// The smallest sine of a dihedral angle after a flip; `None` if it must not be made or this is not more than before and
+    /// than `least`.
+    fn quality_of_flip(&self, flip: &Flip, least: f64) -> Option<f64> {
+        let tets = &self.cuttable.mesh.tets;
+        let (mut least, mut scale) = (least, f64::INFINITY);
+        let mut before = f64::INFINITY;
+        for tet in &flip.removed {
+            let [rest, now] = self.corners(tets[tet.index()]);
+            before = before.min(least_sine(rest));
+            scale = scale.min(volume(now) / volume(rest));
+        }
+        least = least.max(before * (1.0 + GAIN));
+        let scale_limit = PRESENT.min(0.5 * scale);
+        let mut after = f64::INFINITY;
+        for corners in &flip.added {
+            self.looked_at.set(self.looked_at.get() + 1);
+            let [rest, now] = self.corners(*corners);
+            after = after.min(least_sine(rest));
+            let is_better = after > least && scale > 0.0;
+            if !is_better || is_thin(rest) || volume(now) < scale_limit * volume(rest) {
+                return None;
+            }
+        }
+        Some(after)
+    }
+
+    /// Whether a flip leaves what must stay: the boundary if it is kept, and the surfaces of earlier strokes where later ones
+    /// may continue. No face of a surface goes, and a new edge beside a surface ends on it, so that none crosses it where no
+    /// blade comes by any more. One end of the edge must not be locked.
+    fn may_flip(
+        &self,
+        flip: &Flip,
+        is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
+    ) -> bool {
+        let cuttable = &*self.cuttable;
+        if flip.is_doubled(cuttable)
+            || (self.keeps_boundary && flip.is_on_boundary(cuttable))
+            || flip.edge.iter().all(|p| is_locked(cuttable, *p))
+        {
+            return false;
+        }
+        let corners: Vec<ParticleId> = flip.edge.iter().chain(&flip.ring).copied().collect();
+        let strokes = self.registry.strokes_through(&corners);
+        strokes.into_iter().all(|stroke| {
+            let is_on = |p: &ParticleId| self.registry.is_on_surface_of(*p, stroke);
+            let loses_face = flip.edge.iter().all(is_on) && flip.ring.iter().any(is_on);
+            let mut diagonal = flip.diagonal.iter();
+            !loses_face && diagonal.all(|ends| ends.iter().any(is_on))
+        })
+    }
+
     /// Notes the state of a tet before its first change.
     fn note(&mut self, tet: TetId, is_reshaped: bool) {
         let faces = &self.cuttable.faces;
@@ -806,6 +991,7 @@ impl Improvement<'_> {
             first,
             deleted,
             collapsed,
+            flipped,
             ..
         } = self;
         let mesh = &cuttable.mesh;
@@ -813,6 +999,7 @@ impl Improvement<'_> {
             particles_before: mesh.positions.len(),
             tets_before: mesh.tets.len(),
             collapsed,
+            flipped,
             worst_volume_ratio: 1.0,
             ..CutDelta::default()
         };

@@ -39,6 +39,7 @@ mod delta;
 mod error;
 mod faces;
 mod finite;
+mod flips;
 mod improve;
 mod index;
 mod level_set;
@@ -72,7 +73,7 @@ pub use delta::{
     AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, MovedTet, RelinkedTet, RemovedTet,
 };
 pub use error::CutError;
-pub use improve::{ImproveOptions, improve};
+pub use improve::{ImproveOptions, ImproveQueue, improve};
 pub use level_set::cut_level_set;
 pub use options::{CutOptions, Separation};
 pub use pieces::{Piece, PieceEvent, PieceTracker};

@@ -205,7 +205,7 @@ impl PieceTracker {
         self.parts.visited_tets = 0;
         let reduced = self.renumber(cuttable, delta);
         let mut events = Vec::new();
-        if delta.collapsed > 0 {
+        if delta.is_improvement() {
             // An improvement keeps the topology.
             return events;
         }
@@ -240,7 +240,7 @@ impl PieceTracker {
             pieces[piece as usize].tets += 1;
         }
         let positions = &cuttable.mesh().positions;
-        if delta.collapsed > 0 {
+        if delta.is_improvement() {
             // The tets that keep their slots have another volume.
             for removed in &delta.removed {
                 let piece = piece_of[removed.tet.index()];

@@ -12,6 +12,7 @@
 use std::collections::HashMap;
 
 use foldhash::fast::FixedState;
+use glam::DVec3;
 use incise_mesh::ParticleId;
 
 use crate::blade::{ALIGNED, CrossedEdge, SAME_SHEET};
@@ -82,6 +83,43 @@ impl StrokeRegistry {
     pub fn is_on_surface(&self, particle: ParticleId) -> bool {
         self.entries(particle)
             .any(|(_, mark)| mark.tangent.is_some())
+    }
+
+    /// Whether each earlier stroke whose surface has a particle has another one on the same sheet, with tangent planes that
+    /// pass each other's particle within a distance, so that the first can be merged into the other.
+    pub(crate) fn has_on_same_sheets(
+        &self,
+        rest: &[DVec3],
+        [from, to]: [ParticleId; 2],
+        distance: f64,
+    ) -> bool {
+        self.entries(from).all(|(stroke, mark)| {
+            let Some(ours) = mark.tangent else {
+                return true;
+            };
+            let theirs = self.mark(to, stroke).and_then(|mark| mark.tangent);
+            theirs.is_some_and(|theirs| {
+                ours.normal.dot(theirs.normal) >= ALIGNED
+                    && ours.distance(rest[to.index()]).abs() <= distance
+                    && theirs.distance(rest[from.index()]).abs() <= distance
+            })
+        })
+    }
+
+    /// The earlier strokes that have one of some particles on their surface, ascending.
+    pub(crate) fn strokes_through(&self, particles: &[ParticleId]) -> Vec<u32> {
+        let entries = particles.iter().flat_map(|&p| self.entries(p));
+        let through = entries.filter(|(_, mark)| mark.tangent.is_some());
+        let mut strokes: Vec<u32> = through.map(|(stroke, _)| stroke).collect();
+        strokes.sort_unstable();
+        strokes.dedup();
+        strokes
+    }
+
+    /// Whether a particle is on the surface of an earlier stroke of a number.
+    pub(crate) fn is_on_surface_of(&self, particle: ParticleId, stroke: u32) -> bool {
+        let mark = self.mark(particle, stroke);
+        mark.is_some_and(|mark| mark.tangent.is_some())
     }
 
     pub(crate) fn next_stroke(&mut self) -> u32 {

@@ -6,7 +6,7 @@
 use incise_mesh::{ParticleId, TetId};
 
 use crate::faces::{Face, sorted};
-use crate::{CutDelta, CutError, CuttableMesh};
+use crate::{AddedTet, CutDelta, CutError, CuttableMesh};
 
 impl CuttableMesh {
     /// Undoes the last cut or removal: restores the mesh before it, byte for byte.
@@ -15,10 +15,11 @@ impl CuttableMesh {
     /// or start new ones.
     ///
     /// # Errors
-    /// [`CutError::NotLast`] if the mesh does not have the size that `delta` left it with; nothing is changed then.
+    /// [`CutError::NotLast`] if the mesh does not have the size and the new tets that `delta` left it with; nothing is changed
+    /// then.
     ///
     /// # Panics
-    /// If `delta` is of another mesh of the same size.
+    /// If `delta` is of another mesh of the same size with the same new tets.
     ///
     /// # Example
     /// ```
@@ -36,7 +37,13 @@ impl CuttableMesh {
     /// ```
     pub fn undo(&mut self, delta: &CutDelta) -> Result<(), CutError> {
         let (tets, particles) = (delta.tets_after(), delta.particles_after());
-        if (self.mesh.tets.len(), self.mesh.positions.len()) != (tets, particles) {
+        let has_child = |child: &AddedTet| {
+            let slot = delta.slot_after(child.tet).index();
+            self.mesh.tets.get(slot) == Some(&child.corners)
+        };
+        if (self.mesh.tets.len(), self.mesh.positions.len()) != (tets, particles)
+            || !delta.added.iter().all(has_child)
+        {
             return Err(CutError::NotLast { tets, particles });
         }
         delta.take_back(self);

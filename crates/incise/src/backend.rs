@@ -145,7 +145,7 @@ impl AnySolver {
         solver.truncate_tets(delta.tets_after());
         let mut star = Vec::new();
         let touched = touched(delta);
-        let regions = if delta.collapsed > 0 {
+        let regions = if delta.is_improvement() {
             regions(delta, &touched)
         } else {
             Vec::new()
@@ -494,7 +494,9 @@ impl Momentum {
 
 #[cfg(test)]
 mod tests {
-    use incise_cutting::{CutOptions, ImproveOptions, Plane, cut_plane, improve};
+    use incise_cutting::{
+        CutOptions, ImproveOptions, ImproveQueue, Plane, StrokeRegistry, cut_plane, improve,
+    };
     use incise_mesh::kuhn_box;
     use incise_xpbd::Material;
 
@@ -537,7 +539,7 @@ mod tests {
                 solver.positions(&mut positions);
                 (mass, Momentum::of(solver, &all), positions)
             };
-            let mut near = Vec::new();
+            let mut queue = ImproveQueue::default();
             for (i, normal) in [DVec3::X, DVec3::new(1.0, 0.3, 0.1)]
                 .into_iter()
                 .enumerate()
@@ -553,12 +555,16 @@ mod tests {
                 let (_, _, positions) = all(&any);
                 let delta = cut_plane(&mut cuttable, &positions, &plane, &options).unwrap();
                 any.apply_delta(&delta, &cuttable).unwrap();
-                near.extend(delta.created_particles());
+                queue.extend(delta.created_particles());
             }
             let (mass, before, positions) = all(&any);
             let options = ImproveOptions::default();
-            let delta =
-                improve(&mut cuttable, &positions, &mut near, &options, |_, _| false).unwrap();
+            let registry = StrokeRegistry::default();
+            let body = &mut cuttable;
+            let delta = improve(body, &positions, &mut queue, &options, &registry, |_, _| {
+                false
+            });
+            let delta = delta.unwrap();
             assert!(delta.collapsed > 10);
             any.apply_delta(&delta, &cuttable).unwrap();
             let (mass_after, after, positions_after) = all(&any);

@@ -10,8 +10,8 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CuttableMesh, ImproveOptions, PieceEvent, PieceTracker, StrokeRegistry, improve,
-    remove_tets,
+    CutDelta, CuttableMesh, ImproveOptions, ImproveQueue, PieceEvent, PieceTracker, StrokeRegistry,
+    improve, remove_tets,
 };
 use incise_mesh::{Bounds, ParticleId, TetId, TetMesh, signed_volume};
 use incise_xpbd::{DistanceConstraint, KappaLimit, SolidBlade, StepReport, StepSettings};
@@ -581,11 +581,11 @@ impl Island {
     }
 
     /// Improves the mesh around particles that strokes created. Particles stay that a constraint names, beside which one
-    /// is held, or where materials meet; those inside that strokes have passed, so that later strokes can continue there;
-    /// and all of the boundary in a scene with contact. Leaves in `near` what is for the next frame.
+    /// is held, or where materials meet, and all of the boundary in a scene with contact. Later strokes can continue those
+    /// in `registry`. Leaves in `queue` what is for the next frame.
     pub(crate) fn improve(
         &mut self,
-        near: &mut Vec<ParticleId>,
+        queue: &mut ImproveQueue,
         registry: &StrokeRegistry,
     ) -> Result<CutDelta, Error> {
         let Self {
@@ -615,12 +615,11 @@ impl Island {
             let tets = mesh.around(particle);
             let mut corners = tets.flat_map(|tet| mesh.mesh().tets[tet.index()]);
             distances.holds(particle)
-                || (registry.is_on_surface(particle) && mesh.is_inside(particle))
                 || solver.handle_of(particle.index()).is_some()
                 || around.any(|tet| solver.material_of(tet.index()) != material)
                 || corners.any(|p| !solver.is_free(p.index()))
         };
-        let improved = improve(cuttable, positions, near, &options, is_locked);
+        let improved = improve(cuttable, positions, queue, &options, registry, is_locked);
         improved.map_err(Error::cut("cutting.improve"))
     }
 
@@ -636,7 +635,7 @@ impl Island {
         for tet in &delta.deleted {
             self.removed_volume += signed_volume(tet.corners.map(|p| positions[p.index()]));
         }
-        if delta.collapsed > 0 {
+        if delta.is_improvement() {
             // An improvement keeps the volume but for rounding.
             let volume =
                 |corners: [ParticleId; 4]| signed_volume(corners.map(|p| positions[p.index()]));

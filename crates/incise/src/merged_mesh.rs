@@ -188,6 +188,7 @@ impl MergedMesh {
             crumbs: delta.crumbs,
             crumb_volume: delta.crumb_volume,
             collapsed: delta.collapsed,
+            flipped: delta.flipped,
             bent: delta.bent.iter().map(|&p| particle(p)).collect(),
             opened: delta.opened,
             worst_volume_ratio: delta.worst_volume_ratio,

@@ -229,7 +229,7 @@ impl Partition {
     /// Whether the tets that a delta gives other corners stay in their clusters: those of an improvement, unless clusters
     /// are merged around them. By themselves they would be clusters of one tet each.
     fn keeps(&self, delta: &CutDelta) -> bool {
-        delta.collapsed > 0 && !self.settings.merges
+        delta.is_improvement() && !self.settings.merges
     }
 
     /// Takes cut and deleted tets out of their clusters, and notes their pairs and the clusters of relinked tets.

@@ -197,6 +197,9 @@ pub struct CutReport {
     /// Tets that these took with them, whose volume others have now; absent if none.
     #[serde(skip_serializing_if = "is_zero")]
     pub tets_merged: usize,
+    /// Edges inside that the improvement after a stroke flipped away; absent if none.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub flipped: usize,
     /// The smallest volume of a new tet as a fraction of the one it was cut from.
     pub worst_volume_ratio: f64,
     /// Number of removed tets; absent if none.
@@ -225,8 +228,9 @@ pub struct CutWork {
 impl CutReport {
     /// Adds what a stroke changed.
     pub(crate) fn add(&mut self, delta: &CutDelta) {
-        if delta.collapsed > 0 {
+        if delta.is_improvement() {
             self.collapsed += delta.collapsed;
+            self.flipped += delta.flipped;
             self.tets_merged += delta.deleted.len();
             return;
         }
@@ -254,6 +258,7 @@ impl Default for CutReport {
             snapped: 0,
             crumbs: 0,
             collapsed: 0,
+            flipped: 0,
             tets_merged: 0,
             tets_removed: 0,
             worst_volume_ratio: 1.0,

@@ -4,10 +4,9 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use incise_cutting::{
-    BoundaryTriangle, CutDelta, CutOptions, FaceTag, StrokeRegistry, Sweep, carve, cut_level_set,
-    cut_plane, cut_surface_joining,
+    BoundaryTriangle, CutDelta, CutOptions, FaceTag, ImproveQueue, StrokeRegistry, Sweep, carve,
+    cut_level_set, cut_plane, cut_surface_joining,
 };
-use incise_mesh::ParticleId;
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
@@ -55,7 +54,7 @@ pub(crate) struct Timeline {
     improves: bool,
     /// For each island the particles around which its mesh is to be improved: those of the tets that strokes created, until
     /// frames without a blade have worked on them.
-    created: Vec<Vec<ParticleId>>,
+    created: Vec<ImproveQueue>,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
@@ -301,10 +300,7 @@ impl Timeline {
     pub(crate) fn join(&mut self, into: usize, other: usize, particles: usize) {
         if other < self.created.len() {
             let of_other = self.created.remove(other);
-            let shifted = of_other
-                .iter()
-                .map(|p| ParticleId::new(particles + p.index()));
-            self.created[into].extend(shifted);
+            self.created[into].append(&of_other, particles);
         }
         if other < self.registries.len() {
             let of_other = self.registries.remove(other);
@@ -355,7 +351,8 @@ impl Timeline {
                 }
                 delta.extend_particles(&mut island.positions);
                 if self.improves {
-                    self.created.resize_with(island_count, Vec::new);
+                    self.created
+                        .resize_with(island_count, ImproveQueue::default);
                     self.created[g].extend(delta.created_particles());
                 }
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {

@@ -93,7 +93,7 @@ pub(crate) fn check_cut(before: &TetMesh, after: &CuttableMesh, delta: &CutDelta
     delta.apply(&mut replayed);
     assert_eq!(&replayed, after.mesh(), "the delta says everything");
     // What an improvement deletes, other tets take over.
-    let gone = delta.deleted.iter().filter(|_| delta.collapsed == 0);
+    let gone = delta.deleted.iter().filter(|_| !delta.is_improvement());
     let gone: f64 = gone.map(|t| before.volume(t.tet)).sum();
     let (old, new) = (before.total_volume() - gone, after.mesh().total_volume());
     assert!(

@@ -2,8 +2,8 @@
 
 use glam::DVec3;
 use incise_cutting::{
-    CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, ImproveOptions, PieceTracker, Plane,
-    Skin, StrokeRegistry, Sweep, cut_plane, cut_surface, improve, remove_tets,
+    CutDelta, CutError, CutOptions, CuttableMesh, FaceTag, ImproveOptions, ImproveQueue,
+    PieceTracker, Plane, Skin, StrokeRegistry, Sweep, cut_plane, cut_surface, improve, remove_tets,
 };
 use incise_mesh::{ParticleId, TetId, TetMesh, closest_on_triangle, kuhn_box};
 use proptest::prelude::*;
@@ -16,7 +16,9 @@ struct Patient {
     positions: Vec<DVec3>,
     pieces: PieceTracker,
     skin: Skin,
-    near: Vec<ParticleId>,
+    queue: ImproveQueue,
+    flipped: usize,
+    registry: StrokeRegistry,
     /// The cut faces of each stroke before they were improved.
     opened: Vec<Vec<[DVec3; 3]>>,
 }
@@ -29,7 +31,9 @@ impl Patient {
             pieces: PieceTracker::new(&body),
             skin: Skin::new(body.boundary()),
             body,
-            near: Vec::new(),
+            queue: ImproveQueue::default(),
+            flipped: 0,
+            registry: StrokeRegistry::default(),
             opened: Vec::new(),
         }
     }
@@ -40,7 +44,7 @@ impl Patient {
         self.pieces.apply_delta(&self.body, delta);
         self.pieces.check(&self.body).unwrap();
         self.skin.apply_delta(delta);
-        self.near.extend(delta.created_particles());
+        self.queue.extend(delta.created_particles());
     }
 
     /// Returns the number of faces that are recorded.
@@ -50,6 +54,19 @@ impl Patient {
         let delta = cut_plane(&mut self.body, &self.positions, &plane, options).unwrap();
         self.apply(&before, &delta);
         delta.opened
+    }
+
+    /// Moves the blade of a stroke that joins earlier ones.
+    fn advance(&mut self, stroke: &mut Sweep, blade: &[DVec3]) {
+        let before = self.body.mesh().clone();
+        let Self {
+            body,
+            positions,
+            registry,
+            ..
+        } = self;
+        let delta = stroke.advance_joining(body, positions, blade, registry);
+        self.apply(&before, &delta.unwrap());
     }
 
     /// Improves and checks what must hold.
@@ -64,18 +81,20 @@ impl Patient {
         let count = self.pieces.count();
         let worst = sines(&before).fold(1.0, f64::min);
         let boundary = triangles(&self.body);
-        let mut near = std::mem::take(&mut self.near);
+        let mut queue = std::mem::take(&mut self.queue);
         let delta = improve(
             &mut self.body,
             &self.positions,
-            &mut near,
+            &mut queue,
             options,
+            &self.registry,
             |_, p| locked(p),
         )
         .unwrap();
-        assert!(near.is_empty() || options.max_tets < usize::MAX);
+        assert!(queue.is_empty() || options.max_tets < usize::MAX);
         self.apply(&before, &delta);
-        self.near = near;
+        self.queue = queue;
+        self.flipped += delta.flipped;
         assert_eq!(self.pieces.count(), count);
         let now = sines(self.body.mesh()).fold(1.0, f64::min);
         assert!(
@@ -188,7 +207,9 @@ fn a_plane_through_a_grid() {
                 break;
             }
             calls += 1;
-            patient.near = (0..delta.particles_after()).map(ParticleId::new).collect();
+            patient.queue = ImproveQueue::default();
+            let all = (0..delta.particles_after()).map(ParticleId::new);
+            patient.queue.extend(all);
         }
         assert!((1..10).contains(&calls));
         let left = patient.body.mesh().tets.len() - mesh.tets.len();
@@ -208,23 +229,26 @@ fn bad_tolerances_are_refused() {
         let refused = improve(
             &mut body,
             &mesh.positions,
-            &mut Vec::new(),
+            &mut ImproveQueue::default(),
             &options,
+            &StrokeRegistry::default(),
             |_, _| false,
         );
         assert!(matches!(refused, Err(CutError::Improve { .. })));
     }
     let options = ImproveOptions::default();
-    let refused = improve(&mut body, &[], &mut Vec::new(), &options, |_, _| false);
+    let registry = StrokeRegistry::default();
+    let queue = &mut ImproveQueue::default();
+    let refused = improve(&mut body, &[], queue, &options, &registry, |_, _| false);
     assert!(refused.is_err());
     assert_eq!(body.mesh(), &mesh);
 }
 
-/// Ten slices a tenth of a cell apart, or a fifth where crossings move by snapping: with improvement the body has less than
-/// a quarter of the tets, and as many pieces.
+/// Ten slices a tenth of a cell apart, or a quarter where crossings move by snapping, since edges become longer and crossings
+/// move further along them: with improvement the body has less than a quarter of the tets, and as many pieces.
 #[test]
 fn ten_thin_slices() {
-    for (snap, apart) in [(0.0, 0.1), (0.1, 0.2)] {
+    for (snap, apart) in [(0.0, 0.1), (0.1, 0.25)] {
         let mesh = jittered_box(6, 0.1, 3);
         let run = |improves: bool| {
             let mut patient = Patient::new(&mesh, mesh.positions.clone());
@@ -354,19 +378,58 @@ fn both_sides_are_crossed_at_one_place() {
             );
         }
         assert_eq!(patient.pieces.count(), 4);
-        let corners = patient.body.boundary().filter(|t| t.tag != FaceTag::Outer);
-        let mut particles: Vec<ParticleId> = corners.flat_map(|t| t.particles).collect();
-        particles.sort_unstable();
-        particles.dedup();
-        let rest = |p: ParticleId| patient.body.mesh().positions[p.index()];
-        for (i, &one) in particles.iter().enumerate() {
-            for &other in &particles[i + 1..] {
-                let distance = rest(one).distance(rest(other)) / edge;
-                assert!(
-                    !(1e-12..1e-4).contains(&distance),
-                    "snap {snap}, swept {is_swept}: {one:?} and {other:?} are {distance} edges apart"
-                );
-            }
+        check_places(&patient);
+    }
+}
+
+/// One side of a cut has longer edges than the other, since particles on planes were merged there only: a cut across both
+/// crosses them at one place.
+#[test]
+fn sides_with_different_edges_are_crossed_at_one_place() {
+    let mesh = jittered_box(5, 0.1, 5);
+    let edge = edge_of(&mesh);
+    let normal = DVec3::new(1.0, 0.2, 0.1);
+    let mut patient = Patient::new(&mesh, mesh.positions.clone());
+    patient.plane(DVec3::splat(0.43), normal, &options(0.0));
+    patient.plane(DVec3::splat(0.47), DVec3::new(0.1, 1.0, 0.2), &options(0.0));
+    let is_behind = |tet: TetId, body: &CuttableMesh| {
+        let center = body.mesh().corners(tet).iter().sum::<DVec3>() * 0.25;
+        normal.dot(center - DVec3::splat(0.43)) < 0.0
+    };
+    let behind: Vec<ParticleId> = (0..patient.positions.len())
+        .map(ParticleId::new)
+        .filter(|p| {
+            let mut around = patient.body.around(*p);
+            around.any(|tet| is_behind(tet, &patient.body))
+        })
+        .collect();
+    let delta = patient.improve(&ImproveOptions::default(), |p| {
+        behind.binary_search(&p).is_ok()
+    });
+    assert!(delta.collapsed > 10);
+    let rest = patient.body.mesh().positions.iter().enumerate();
+    let by = |i: usize| DVec3::from_array([0, 1, 2].map(|k| noise(9, 3 * i + k)));
+    patient.positions = rest.map(|(i, x)| x + 1e-6 * edge * by(i)).collect();
+    patient.plane(DVec3::splat(0.45), DVec3::new(0.2, 0.1, 1.0), &options(0.0));
+    assert_eq!(patient.pieces.count(), 8);
+    check_places(&patient);
+}
+
+/// Particles of cut faces are at one place or clearly apart.
+fn check_places(patient: &Patient) {
+    let edge = edge_of(patient.body.mesh());
+    let corners = patient.body.boundary().filter(|t| t.tag != FaceTag::Outer);
+    let mut particles: Vec<ParticleId> = corners.flat_map(|t| t.particles).collect();
+    particles.sort_unstable();
+    particles.dedup();
+    let rest = |p: ParticleId| patient.body.mesh().positions[p.index()];
+    for (i, &one) in particles.iter().enumerate() {
+        for &other in &particles[i + 1..] {
+            let distance = rest(one).distance(rest(other)) / edge;
+            assert!(
+                !(1e-12..1e-4).contains(&distance),
+                "{one:?} and {other:?} are {distance} edges apart"
+            );
         }
     }
 }
@@ -390,7 +453,7 @@ fn limited_calls_continue() {
             ..ImproveOptions::default()
         };
         let (mut calls, mut largest) = (0, 0);
-        while !patient.near.is_empty() {
+        while !patient.queue.is_empty() {
             let delta = patient.improve(&options, |_| false);
             largest = largest.max(delta.collapsed);
             calls += 1;
@@ -454,7 +517,6 @@ fn cut_faces_stay_with_their_stroke() {
     // Many at one place, which join each other where they are nearly one surface.
     let dense = |snap: f64| {
         let mut patient = Patient::new(&mesh, mesh.positions.clone());
-        let mut registry = StrokeRegistry::default();
         for i in 0..16 {
             let direction =
                 |k: usize| DVec3::from_array([0, 1, 2].map(|j| noise(1, 20 * i + 3 * k + j)));
@@ -470,22 +532,72 @@ fn cut_faces_stay_with_their_stroke() {
             let mut stroke =
                 Sweep::new(&patient.body, &patient.positions, &pose(-1.0), options).unwrap();
             for t in [-0.5, 0.0, 0.5, 1.0] {
-                let before = patient.body.mesh().clone();
-                let positions = patient.positions.clone();
-                let delta = stroke
-                    .advance_joining(&mut patient.body, &positions, &pose(t), &mut registry)
-                    .unwrap();
-                patient.apply(&before, &delta);
+                patient.advance(&mut stroke, &pose(t));
             }
             patient.opened.push(faces_of(&patient.body, tag));
-            let delta = patient.improve(&improves, |_| false);
-            registry.apply_delta(&patient.body, &delta, &options);
+            patient.improve(&improves, |_| false);
         }
         patient
     };
     for snap in [0.0, 0.1] {
         for patient in [crossing(snap), turned(snap), across(snap), dense(snap)] {
             check_faces(&patient, improves.tolerance * edge_of(&mesh));
+        }
+    }
+}
+
+/// A stroke that stops in the body is improved at its front and continued later, on its plane and turned a little, or in
+/// a second row over the first one: the body separates as it does without improvement.
+#[test]
+fn strokes_continue_across_improved_fronts() {
+    let run = |case: usize, snap: f64, improves: bool| {
+        let mesh = jittered_box(4, 0.15, case as u64);
+        let mut patient = Patient::new(&mesh, mesh.positions.clone());
+        let random = |k: usize| noise(case as u64, k);
+        let normal = DVec3::new(1.0, 0.4 * random(0), 0.4 * random(1)).normalize();
+        let along = normal.cross(DVec3::Y).normalize();
+        let path = along.cross(normal);
+        let center = DVec3::splat(0.5) + 0.2 * random(2) * normal;
+        let middle = 0.3 * random(3);
+        // Each with the blade, and its way along `path`.
+        let turned = (path + 0.15 * random(4) * normal).normalize();
+        let strokes = match case % 3 {
+            0 => [
+                ([-1.5, 1.5], path, [-1.5, middle]),
+                ([-1.5, 1.5], path, [middle, 1.5]),
+            ],
+            1 => [
+                ([-1.5, 1.5], path, [-1.5, middle]),
+                ([-1.5, 1.5], turned, [middle, 1.5]),
+            ],
+            _ => [
+                ([-1.5, middle + 0.2], path, [-1.5, 1.5]),
+                ([middle - 0.2, 1.5], path, [1.5, -1.5]),
+            ],
+        };
+        for (tag, (blade, way, span)) in (0..).zip(strokes) {
+            let start = center + middle * (path - way);
+            let pose = |t: f64| blade.map(|x| start + x * along + t * way);
+            let options = CutOptions {
+                tag,
+                ..options(snap)
+            };
+            let (body, positions) = (&patient.body, &patient.positions);
+            let mut stroke = Sweep::new(body, positions, &pose(span[0]), options).unwrap();
+            for k in 1..=6 {
+                let to = span[0] + (span[1] - span[0]) * f64::from(k) / 6.0;
+                patient.advance(&mut stroke, &pose(to));
+            }
+            if improves {
+                patient.improve(&ImproveOptions::default(), |_| false);
+            }
+        }
+        patient.pieces.count()
+    };
+    for case in (0..12).chain([21]) {
+        for snap in [0.0, 0.1] {
+            let [plain, improved] = [false, true].map(|improves| run(case, snap, improves));
+            assert_eq!(plain, improved, "case {case}, snap {snap}");
         }
     }
 }
