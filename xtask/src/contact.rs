@@ -4,6 +4,8 @@
 //! affects both alike. The share of contact is what the frame takes longer, the solver's passes included. The two run over
 //! the same tets but not over the same motion, because without contact the parts pass through each other.
 //!
+//! Sliding: a soft block that is cut into ten slices while it falls, where nearly every vertex moves.
+//!
 //! Depths: stacks of cubes, and a pile of organs in a box, in percent of the mean edge.
 
 use incise::mesh::glam::{DVec3, dvec3};
@@ -28,6 +30,7 @@ const DEPTHS: [f64; 3] = [0.01, 0.001, 0.1];
 #[derive(Clone, Debug, Serialize, Deserialize)]
 enum Row {
     Cost(Cost),
+    Slices(Slices),
     Depth(Depth),
 }
 
@@ -42,8 +45,8 @@ struct Cost {
     colors: usize,
     /// Median of a frame without contact and with it, in ms.
     ms: [f64; 2],
-    /// Median of what finding and coloring takes, in ms.
-    find_ms: f64,
+    /// Median and mean of what finding and coloring takes, in ms.
+    find_ms: [f64; 2],
     /// The frame of the cut, without contact and with it, in ms.
     cut_ms: [f64; 2],
     /// The slowest frame of all with contact, in ms.
@@ -57,6 +60,21 @@ impl Cost {
     fn share(&self) -> f64 {
         1.0 - self.ms[0] / self.ms[1]
     }
+}
+
+/// What contact costs among slices that slide.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Slices {
+    young_modulus: f64,
+    tets: usize,
+    active: usize,
+    /// Mean, median and largest of what finding and coloring takes, in ms.
+    find_ms: [f64; 3],
+    /// Mean of a frame, in ms.
+    ms: f64,
+    /// Largest depth on the way, in mean edges.
+    deepest: f64,
+    buried: usize,
 }
 
 /// How deep bodies at rest are in each other.
@@ -87,6 +105,12 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
                 cost(lies, threads, quick).map(Row::Cost)
             }));
         }
+    }
+    for young_modulus in [3e3, 3e4] {
+        let id = format!("slices-{young_modulus}");
+        cells.push(Cell::new(id, move || {
+            slices(young_modulus, quick).map(Row::Slices)
+        }));
     }
     for count in [2, 5, 10] {
         cells.push(Cell::new(format!("stack-{count}"), move || {
@@ -181,13 +205,71 @@ fn cost(lies: bool, threads: usize, quick: bool) -> anyhow::Result<Cost> {
         active: end.active,
         colors: end.colors,
         ms,
-        find_ms: median(last.iter().map(|report| report.ms.contact)),
+        find_ms: [
+            median(last.iter().map(|report| report.ms.contact)),
+            mean(last.iter().map(|report| report.ms.contact)),
+        ],
         cut_ms,
         worst_ms: with
             .iter()
             .map(|report| report.ms.total)
             .fold(0.0, f64::max),
         depths: [most(|c| c.max_depth), most(|c| c.depth_p99)],
+        buried: end.buried,
+    })
+}
+
+fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
+    let count = values.len() as f64;
+    values.sum::<f64>() / count
+}
+
+/// Cuts a block of 10 cm into ten slices while it falls on the ground, on one thread.
+fn slices(young_modulus: f64, quick: bool) -> anyhow::Result<Slices> {
+    let (tets, measured) = if quick { (300, 3) } else { (9_000, 120) };
+    let mesh = generate(Shape::Box, tets)?;
+    let ends = (DVec3::MAX, DVec3::MIN);
+    let fold = |(low, high): (DVec3, DVec3), x: &DVec3| (low.min(*x), high.max(*x));
+    let (low, high) = mesh.positions.iter().fold(ends, fold);
+    let scale = 0.1 / (high.z - low.z);
+    let mut builder = Simulation::builder();
+    builder
+        .gravity(DVec3::NEG_Z * 9.81)
+        .ground(0.0, 0.5)
+        .solver(solver(20))
+        .threads(1);
+    let body = Body::new(mesh)
+        .scale(scale)
+        .position(dvec3(0.0, 0.0, 0.002 - low.z * scale));
+    builder.add_body(
+        body.young_modulus(young_modulus)
+            .density(1000.0)
+            .damping(0.01),
+    );
+    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.4));
+    for number in 1..10_u32 {
+        let x = (low.x + (high.x - low.x) * f64::from(number) / 10.0) * scale;
+        let frame = u64::from(3 + 2 * number);
+        builder.add_stroke(StrokeSpec::plane(frame, [x, 0.0, 0.0], [1.0, 0.05, 0.02]));
+    }
+    let mut simulation = builder.build()?;
+    let mut reports = Vec::new();
+    for _ in 0..30 + measured {
+        reports.push(simulation.step()?.clone());
+    }
+    let last = &reports[30..];
+    let find = || last.iter().map(|report| report.ms.contact);
+    let contacts = last.iter().filter_map(|report| report.contact);
+    let end = simulation.report().contact.unwrap_or_default();
+    Ok(Slices {
+        young_modulus,
+        tets: simulation.mesh().tets.len(),
+        active: end.active,
+        find_ms: [mean(find()), median(find()), find().fold(0.0, f64::max)],
+        ms: mean(last.iter().map(|report| report.ms.total)),
+        deepest: contacts
+            .map(|contact| contact.max_depth)
+            .fold(0.0, f64::max),
         buried: end.buried,
     })
 }
@@ -278,10 +360,22 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             "colors",
             "ms without",
             "ms with",
-            "of these finding",
+            "of these finding, median and mean",
             "share of contact",
             "ms of the frame of the cut, without and with",
             "slowest frame",
+        ],
+    );
+    let mut sliding = Table::new(
+        "Ten slices that slide: a block of 10 cm falls while it is cut, 120 frames of 20 substeps, f32, 1 thread",
+        [
+            "E in Pa",
+            "tets",
+            "active",
+            "ms of finding, mean, median and largest",
+            "ms of a frame, mean",
+            "largest depth on the way, in mean edges",
+            "buried",
         ],
     );
     let mut depths = Table::new(
@@ -310,7 +404,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
                     cost.colors.to_string(),
                     format!("{:.2}", cost.ms[0]),
                     format!("{:.2}", cost.ms[1]),
-                    format!("{:.2}", cost.find_ms),
+                    format!("{:.2}, {:.2}", cost.find_ms[0], cost.find_ms[1]),
                     beside(cost.share(), SHARES[usize::from(lies)], 1),
                     format!("{:.1}, {:.1}", cost.cut_ms[0], cost.cut_ms[1]),
                     format!("{:.1}", cost.worst_ms),
@@ -328,6 +422,15 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
                     ]);
                 }
             }
+            Row::Slices(row) => sliding.push([
+                format!("{:.0e}", row.young_modulus),
+                row.tets.to_string(),
+                row.active.to_string(),
+                row.find_ms.map(|ms| format!("{ms:.1}")).join(", "),
+                format!("{:.1}", row.ms),
+                format!("{:.0}%", 100.0 * row.deepest),
+                row.buried.to_string(),
+            ]),
             Row::Depth(depth) => {
                 let aim = DEPTHS[if depth.scene.starts_with("stack") {
                     1
@@ -353,6 +456,7 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             Part::Text(INTRODUCTION.to_owned()),
             Part::Table(costs),
             Part::Text(COSTS.to_owned()),
+            Part::Table(sliding),
             Part::Table(depths),
             Part::Text(PEERS.to_owned()),
         ],

@@ -16,8 +16,9 @@ use crate::{Error, Scene};
 /// Number of colors that cuts may add before all clusters are recolored.
 ///
 /// Each color is a barrier in every iteration, but a full coloring with its new schedule costs more than a frame. A
-/// smaller slack causes more full colorings; a larger one leaves a less dense layout.
-const SLACK: usize = 4;
+/// smaller slack causes more full colorings: with 4 a stroke through 89k tets in 14 colors met one, three frames long. A
+/// larger one leaves a less dense layout.
+const SLACK: usize = 8;
 
 /// The clusters of a mesh, their colors, and the schedule in which they are solved.
 #[derive(Clone, Debug)]
