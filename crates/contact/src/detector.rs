@@ -14,7 +14,7 @@
 //! Motion is measured beside that of parts, the pieces of all bodies: a part that falls or turns as a whole does not
 //! approach itself, and two parts whose boxes are out of reach of each other do not matter to each other. Where two parts
 //! have used up the skin as a whole, those of their vertices are searched for that are near the other part. The search
-//! looks twice as far as what counts as near for the frame, since bodies at rest shake by less than that.
+//! looks beyond what counts as near for the frame, by as much again: bodies at rest shake by less than that.
 //!
 //! The decision to search again depends on positions, velocities and frame time only, so results are the same for any
 //! number of threads. The shape of the search tree does not matter either: candidates are sorted by vertex, then by
