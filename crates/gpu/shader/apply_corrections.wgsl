@@ -28,7 +28,7 @@ fn main(
     if KEEPS {
         if current.weight > 0.0 {
             let start = before[p].xyz;
-            x = start + (x - start) * current.weight;
+            x = x + (x - start) * (current.weight - 1.0);
         }
         before[p] = particle;
     }

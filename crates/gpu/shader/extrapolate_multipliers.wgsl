@@ -21,7 +21,7 @@ fn main(
         start = history[slot];
     }
     if current.weight > 0.0 {
-        multiplier = start.zw + (multiplier - start.zw) * current.weight;
+        multiplier = multiplier + (multiplier - start.zw) * (current.weight - 1.0);
         multipliers[slot] = multiplier;
     }
     // Only the tets change them, so the next iteration begins with these.

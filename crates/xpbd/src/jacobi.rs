@@ -2,7 +2,7 @@
 //!
 //! Corrections are summed color by color, so that no two threads add to one particle at once and every sum has a fixed
 //! order. Chebyshev's semi-iteration then extrapolates along the line through the iterate before last:
-//! `x ← ω (x̂ - x⁻) + x⁻` with x̂ the Jacobi iterate and x⁻ the one before last. Multipliers are extrapolated in the same
+//! `x ← x̂ + (ω - 1) (x̂ - x⁻)` with x̂ the Jacobi iterate and x⁻ the one before last; with ω = 1 that is x̂, to the bit. Multipliers are extrapolated in the same
 //! way, so that they match the positions.
 //!
 //! Source: Wang 2015, algorithm 1, for the extrapolation; paper section 5.3 for the comparison.
@@ -93,14 +93,14 @@ impl<R: Float> Jacobi<R> {
             } else {
                 4.0 / (4.0 - square * self.weight)
             };
-            let weight = R::from_f64(self.weight);
+            let further = R::from_f64(self.weight) - R::ONE;
             for (particle, &before) in particles.iter().zip(&self.before.positions) {
-                let leap = (load::<R>(particle) - before) * weight;
-                store::<R>(particle, before + leap);
+                let now = load::<R>(particle);
+                store::<R>(particle, now + (now - before) * further);
             }
             for (multiplier, &before) in multipliers.iter().zip(&self.before.multipliers) {
-                let leap = (R::load(multiplier) - before) * weight;
-                (before + leap).store(multiplier);
+                let now = R::load(multiplier);
+                (now + (now - before) * further).store(multiplier);
             }
         }
         std::mem::swap(&mut self.last, &mut self.before);

@@ -135,10 +135,9 @@ impl RestRow {
             && self.tets > 0
     }
 
-    /// True if the speed grows by more than the effect of rounding, which takes some frames to come to its level: at most a
-    /// tenth of the bar.
+    /// True if the speed grows by more than the effect of rounding on the largest speed.
     pub(super) fn is_growing(&self) -> bool {
-        self.last > 2.0 * self.first && self.last > 0.1 * self.bar()
+        self.last > 2.0 * self.first
     }
 }
 

@@ -281,7 +281,8 @@ fn rest_cells(quick: bool, folder: &Path, file: Option<PathBuf>) -> Vec<Cell<Row
             CutBody::Irregular(1000),
         ]
     };
-    let lengths = if quick { [5, 50] } else { [30, 500] };
+    // Rounding takes some hundred frames to come to its level.
+    let lengths = [if quick { 5 } else { 30 }, 500];
     let cell = |(number, body): (usize, CutBody)| {
         let folder = folder.to_owned();
         Cell::new(format!("rest-{number}"), move || {

@@ -76,7 +76,7 @@ const REST: &str = "\
 
 Free bodies of 0.25 m, E = 1e5 Pa, no gravity. Thirty random rectangles cut them, one a frame; then they are left alone for \
 500 frames. Bar: fastest particle below 1e-9 m/s in double and 1e-2 m/s in single precision, in the last 100 frames at \
-most twice as fast as in the first 100 unless below a tenth of the limit, 0 inverted tets.";
+most twice as fast as in the first 100, 0 inverted tets.";
 
 pub(super) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     let (mut newton, mut organs) = (vec![], vec![]);

@@ -130,8 +130,7 @@ fn the_page_shows_what_misses_its_bar() {
         (newton(0.5, &["diverged"]), false),
         (newton(0.101, &[]), true),
         (rest(1.9e-12, 0), false),
-        (rest(9e-11, 0), false),
-        (rest(1.1e-10, 0), true),
+        (rest(2.1e-12, 0), true),
         (rest(1e-12, 1), true),
     ] {
         // The quick form has limits for settled states, for rest and for the error of the organ, not for times.

@@ -140,12 +140,10 @@ fn clusters_under_way_are_taken_in_their_frame() {
     };
     let mut first = (0..8).map(|_| simulation.step().unwrap().cut.is_some());
     assert!(first.any(|cut| cut), "no clusters are worn");
+    simulation.step().unwrap();
     let snapshot = simulation.snapshot().unwrap();
     let then = frames(&mut simulation);
-    assert!(
-        then[..2] == [0, 0] && then.iter().any(|&n| n > 0),
-        "{then:?}"
-    );
+    assert!(then[..2] == [0, 0] && then[2] > 0, "{then:?}");
     simulation.restore(&snapshot).unwrap();
     assert_eq!(frames(&mut simulation), then);
     let first = u32::try_from(simulation.report().frame + 1 - 6).unwrap();
