@@ -1,9 +1,8 @@
 //! The scalar kernel that the solver's kernel is compared with: one tet after the other.
 //!
 //! Solves both constraints of a tet as one system, gradients at the corners and all, with structures of plain numbers
-//! in the order of the schedule, single precision, one thread. It is complete and not optimized.
+//! in the order of the solver, single precision, one thread. It is complete and not optimized.
 
-use incise::graph::Schedule;
 use incise::mesh::glam::{DMat3, DVec3, Vec3};
 
 /// A tet with what the solver needs of its rest shape.
@@ -33,12 +32,12 @@ pub(crate) struct Plain {
     reason = "rounding to single precision is the purpose"
 )]
 impl Plain {
-    /// A body with the tets in the order of a schedule. `mu` and `l` are its stiffnesses in Pa.
+    /// A body whose tets are solved in an order. `mu` and `l` are its stiffnesses in Pa.
     pub(crate) fn new(
         positions: &[DVec3],
         weights: &[f64],
         tets: &[[usize; 4]],
-        schedule: &Schedule,
+        order: impl Iterator<Item = u32>,
         [mu, l]: [f64; 2],
         time: f64,
     ) -> Self {
@@ -61,7 +60,7 @@ impl Plain {
             velocities: still.clone(),
             previous: still,
             weights: weights.iter().map(|&w| w as f32).collect(),
-            tets: schedule.order().map(tet).collect(),
+            tets: order.map(tet).collect(),
             gamma: (1.0 + mu / l) as f32,
             time: time as f32,
         }
