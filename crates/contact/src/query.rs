@@ -277,6 +277,15 @@ struct Vertex<'q> {
     normals: &'q VertexNormals,
 }
 
+/// What boxes say about a triangle beside a vertex.
+#[derive(Clone, Copy)]
+struct Beside {
+    /// Whether it may face the vertex within its reach.
+    is_near: bool,
+    /// Whether the tet behind it may contain the vertex.
+    may_contain: bool,
+}
+
 impl Query<'_> {
     /// The tet of another part that contains a vertex, searched for among all tets of a tree over their numbers.
     pub(crate) fn locate(&self, id: ParticleId, tets: &TriangleTree) -> Option<TetId> {
@@ -320,41 +329,29 @@ impl Query<'_> {
         let mut inside = Nearest::<TRIES>::EMPTY;
         let mut containing = NONE;
         let lookout = self.lookout(&vertex);
-        let behind = Box32::around(&Bounds::around([vertex.behind]));
-        for tree in self.trees {
-            // What is unsound has an empty box.
-            let is_wanted = |around: &Around| {
-                (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
-                    || around.tets.overlaps(&behind)
-            };
-            tree.search_where(is_wanted, |leaf| {
-                let slot = leaf.number;
-                let is_near =
-                    !normals.turn_away(leaf.normal) && lookout.reaches(&leaf.bounds, &leaf.steps);
-                let contains = leaf.tet.overlaps(&behind);
-                if !(is_near || contains) || !self.may_touch(&vertex, slot) {
-                    return true;
+        self.each_beside(&vertex, &lookout, |leaf, beside| {
+            if !self.may_touch(&vertex, leaf.number) {
+                return true;
+            }
+            if beside.may_contain {
+                let tet = self.shape.triangle(leaf.number).tet;
+                if self.is_inside(tet, &vertex) {
+                    containing = containing.min(tet.0);
                 }
-                if contains {
-                    let tet = self.shape.triangle(slot).tet;
-                    if self.is_inside(tet, &vertex) {
-                        containing = containing.min(tet.0);
-                    }
+            }
+            if !beside.is_near {
+                return true;
+            }
+            let most = f64::from(lookout.reach(&leaf.steps));
+            if let Some(near) = self.near(&vertex, leaf.number, most) {
+                if !near.is_inside {
+                    outside.insert(near);
+                } else if !self.is_as_at_rest(&vertex, near.slot, near.distance) {
+                    inside.insert(near);
                 }
-                if !is_near {
-                    return true;
-                }
-                let most = f64::from(lookout.reach(&leaf.steps));
-                if let Some(near) = self.near(&vertex, slot, most) {
-                    if !near.is_inside {
-                        outside.insert(near);
-                    } else if !self.is_as_at_rest(&vertex, near.slot, near.distance) {
-                        inside.insert(near);
-                    }
-                }
-                true
-            });
-        }
+            }
+            true
+        });
         for near in outside.iter() {
             found.push(self.contact(&vertex, near));
         }
@@ -393,30 +390,49 @@ impl Query<'_> {
             return false;
         };
         let lookout = self.lookout(&vertex);
-        let behind = Box32::around(&Bounds::around([vertex.behind]));
-        let is_wanted = |around: &Around| {
-            (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
-                || around.tets.overlaps(&behind)
-        };
         let is_near = |leaf: &Leaf| {
             let facing = normals.facing(self.shape.normal(leaf.number));
             let most = f64::from(lookout.reach(&leaf.steps));
             (facing < FACING || !facing.is_finite())
                 && self.within_reach(&vertex, leaf.number, most).is_some()
         };
-        let misses = |leaf: &Leaf| {
-            let may_be_near =
-                lookout.reaches(&leaf.bounds, &leaf.steps) && !normals.turn_away(leaf.normal);
-            let may_contain = leaf.tet.overlaps(&behind);
+        let meets_none = self.each_beside(&vertex, &lookout, |leaf, beside| {
             let tet = || self.shape.triangle(leaf.number).tet;
-            let is_met = (may_be_near || may_contain)
-                && is_of_parts(leaf.part)
+            let is_met = is_of_parts(leaf.part)
                 && self.may_touch(&vertex, leaf.number)
-                && (may_be_near && is_near(leaf) || may_contain && self.is_inside(tet(), &vertex));
+                && (beside.is_near && is_near(leaf)
+                    || beside.may_contain && self.is_inside(tet(), &vertex));
             !is_met
+        });
+        !meets_none
+    }
+
+    /// Calls `visit` with each triangle that may face a vertex within its reach, or has a tet behind it that may contain it,
+    /// until it returns false. Whether it never did.
+    #[inline]
+    fn each_beside(
+        &self,
+        vertex: &Vertex<'_>,
+        lookout: &Lookout,
+        mut visit: impl FnMut(&Leaf, Beside) -> bool,
+    ) -> bool {
+        let normals = vertex.normals;
+        let behind = Box32::around(&Bounds::around([vertex.behind]));
+        // What is unsound has an empty box.
+        let is_wanted = |around: &Around| {
+            (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
+                || around.tets.overlaps(&behind)
+        };
+        let mut look = |leaf: &Leaf| {
+            let beside = Beside {
+                is_near: !normals.turn_away(leaf.normal)
+                    && lookout.reaches(&leaf.bounds, &leaf.steps),
+                may_contain: leaf.tet.overlaps(&behind),
+            };
+            !(beside.is_near || beside.may_contain) || visit(leaf, beside)
         };
         let mut trees = self.trees.into_iter();
-        !trees.all(|tree| tree.search_where(is_wanted, misses))
+        trees.all(|tree| tree.search_where(is_wanted, &mut look))
     }
 
     /// How far away a triangle may be for a vertex.

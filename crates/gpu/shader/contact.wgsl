@@ -11,6 +11,9 @@ const NONE: u32 = 0xffffffffu;
 const PARALLEL_SQUARED: f32 = 0.0001;
 // One over how many times the part of an overlap that is taken back a particle may be moved by.
 const PER_MOVE: f32 = 0.25;
+// The square of the depth under both planes at an edge up to which the one that takes less to satisfy is chosen, in
+// lengths of the edge.
+const SLIGHT: f32 = 1e-4;
 
 struct ContactUniform {
     friction: f32,
@@ -188,17 +191,21 @@ fn face_gap(contact: Contact) -> Gap {
     if !own.exists {
         return Gap(own, 0.0, false);
     }
-    let value = above(now, own, thickness);
-    var gap = Gap(own, new_part(value, above(old, own, thickness)), false);
-    if gap.residual >= 0.0 {
-        return gap;
-    }
-    let beyond = plane_beyond(now, contact.beyond.xyz);
-    if beyond.exists {
-        let height = above(now, beyond, thickness);
-        let residual = new_part(height, above(old, beyond, thickness));
-        if residual > gap.residual {
-            gap = Gap(beyond, residual, false);
+    let height = above(now, own, thickness);
+    var gap = Gap(own, new_part(height, above(old, own, thickness)), false);
+    if height < 0.0 {
+        let beyond = plane_beyond(now, contact.beyond.xyz);
+        if beyond.exists {
+            let other_height = above(now, beyond, thickness);
+            let other = Gap(beyond, new_part(other_height, above(old, beyond, thickness)), false);
+            // The less deep one, or in a slight overlap the one that takes less to satisfy.
+            let deepest = min(height, other_height);
+            let is_slight = deepest * deepest < SLIGHT * dot(now.e1, now.e1);
+            let is_other_less_deep = other_height > height;
+            let is_deeper_better = select(other.residual > gap.residual, gap.residual > other.residual, is_other_less_deep);
+            if is_other_less_deep != (is_slight && is_deeper_better) {
+                gap = other;
+            }
         }
     }
     gap.is_past = !(gap.residual >= 0.0) && is_past(now, contact.limit, thickness);

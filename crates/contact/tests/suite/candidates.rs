@@ -1,7 +1,7 @@
 //! Candidates against the slow search, on random bodies, after random cuts.
 
 use glam::DVec3;
-use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState, FaceContact};
+use incise_contact::{BodyPairs, ContactDetector, ContactSettings, FaceContact};
 use incise_cutting::{CutOptions, Sweep, remove_tets};
 use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
 use incise_meshing::{Shape, generate};
@@ -180,14 +180,7 @@ fn after_200_deltas() {
     // are compared.
     let body_of = scene.contacts.body_of().to_vec();
     let mut fresh = ContactDetector::new(&scene.body, body_of, settings(true, 0.2)).unwrap();
-    fresh.update(&ContactState {
-        mesh: &scene.body,
-        pieces: &scene.pieces,
-        positions: &scene.positions,
-        velocities: &scene.velocities,
-        fixed: &scene.fixed,
-        frame_time: scene.frame_time,
-    });
+    fresh.update(&scene.state());
     let reach = scene.reach(&[], &[]);
     let pairs = scene.contacts.fresh_pairs();
     let compared = |contact: &&FaceContact| {

@@ -74,14 +74,7 @@ pub(crate) fn expected(scene: &Scene) -> Expected {
 }
 
 fn slow(scene: &Scene) -> Slow<'_> {
-    let state = ContactState {
-        mesh: &scene.body,
-        pieces: &scene.pieces,
-        positions: &scene.positions,
-        velocities: &scene.velocities,
-        fixed: &scene.fixed,
-        frame_time: scene.frame_time,
-    };
+    let state = scene.state();
     let mut partners: BTreeMap<u32, BTreeSet<u32>> = BTreeMap::new();
     for [a, b] in scene.contacts.fresh_pairs().iter() {
         partners.entry(a.0).or_default().insert(b.0);

@@ -1,7 +1,7 @@
 //! A detector that is written and read again continues bit for bit.
 
 use glam::DVec3;
-use incise_contact::{ContactDetector, ContactSettings, ContactState};
+use incise_contact::{ContactDetector, ContactSettings};
 
 use crate::scene::{Scene, jittered_box};
 
@@ -26,14 +26,7 @@ fn continues_bit_for_bit() {
         let high = scene.positions.iter_mut().filter(|x| x.z > 0.99);
         high.for_each(|x| *x += DVec3::new(0.03, 0.01, -0.01));
         let update = scene.update();
-        let same = read.update(&ContactState {
-            mesh: &scene.body,
-            pieces: &scene.pieces,
-            positions: &scene.positions,
-            velocities: &scene.velocities,
-            fixed: &[],
-            frame_time: scene.frame_time,
-        });
+        let same = read.update(&scene.state());
         assert_eq!(update, same);
         assert_eq!(read.faces(), scene.contacts.faces());
         assert_eq!(read.pairs(), scene.contacts.pairs());

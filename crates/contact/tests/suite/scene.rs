@@ -85,43 +85,56 @@ impl Scene {
         }
     }
 
-    pub(crate) fn update(&mut self) -> ContactUpdate {
-        let state = ContactState {
+    pub(crate) fn state(&self) -> ContactState<'_> {
+        ContactState {
             mesh: &self.body,
             pieces: &self.pieces,
             positions: &self.positions,
             velocities: &self.velocities,
             fixed: &self.fixed,
             frame_time: self.frame_time,
+        }
+    }
+
+    /// The detector, and the state that it is to look at.
+    fn split(&mut self) -> (&mut ContactDetector, ContactState<'_>) {
+        let Self {
+            body: mesh,
+            pieces,
+            contacts,
+            positions,
+            velocities,
+            fixed,
+            frame_time,
+        } = self;
+        let state = ContactState {
+            mesh,
+            pieces,
+            positions,
+            velocities,
+            fixed,
+            frame_time: *frame_time,
         };
-        self.contacts.update(&state)
+        (contacts, state)
+    }
+
+    pub(crate) fn update(&mut self) -> ContactUpdate {
+        let (contacts, state) = self.split();
+        contacts.update(&state)
     }
 
     /// What a search for all vertices finds. The contacts of the scene stay as they are.
     pub(crate) fn searched_anew(&self) -> ContactDetector {
         let mut fresh = self.contacts.clone();
         fresh.search_again();
-        fresh.update(&ContactState {
-            mesh: &self.body,
-            pieces: &self.pieces,
-            positions: &self.positions,
-            velocities: &self.velocities,
-            fixed: &self.fixed,
-            frame_time: self.frame_time,
-        });
+        fresh.update(&self.state());
         fresh
     }
 
     /// Into how many parts a frame is divided.
     pub(crate) fn intervals(&mut self) -> u32 {
-        self.contacts.intervals(&ContactState {
-            mesh: &self.body,
-            pieces: &self.pieces,
-            positions: &self.positions,
-            velocities: &self.velocities,
-            fixed: &self.fixed,
-            frame_time: self.frame_time,
-        })
+        let (contacts, state) = self.split();
+        contacts.intervals(&state)
     }
 
     /// How far apart the search looks for particles that may touch those of another group, by the rule that its

@@ -266,8 +266,8 @@ fn pinned_bodies_have_no_contacts_of_their_own() {
 #[test]
 fn results_with_contact_are_those_of_the_last_version() {
     for (precision, golden) in [
-        (Precision::F32, 0x4000_8008_739d_e79e),
-        (Precision::F64, 0xb776_8df3_037a_e870),
+        (Precision::F32, 0x11a8_d1bf_0c4d_e992),
+        (Precision::F64, 0x1d7a_4555_f75f_5a69),
     ] {
         for threads in [1, 3] {
             let mut simulation = busy(precision, threads).build().unwrap();

@@ -15,9 +15,12 @@
 //! directions tells inside from outside only as long as they have not turned past each other.
 //!
 //! Near a convex edge a vertex is outside if it is outside of one of both surfaces that meet there. So a contact may
-//! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that takes
-//! less to satisfy. With one plane only, or with a normal in between, a vertex of a floor catches the front of a block
-//! that slides over it. The normal of the second plane is given in the basis of the triangle, so it turns with it.
+//! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that the
+//! vertex is less deep under. With one plane only, or with a normal in between, a vertex of a floor catches the front of a
+//! block that slides over it. The normal of the second plane is given in the basis of the triangle, so it turns with it.
+//! The overlap of contacts at rest must not catch either: where the vertex is under neither by more than 1% of the edge,
+//! the contact acts along the plane that takes less to satisfy. A deep overlap must not have that choice: a vertex on its
+//! way out of one plane could go ever deeper under the other.
 //!
 //! A plane has no end, a surface has: past a rim a vertex would be held where there is nothing below it. So a contact may
 //! have a limit, a direction away from the nearest edge and a distance along it beyond which the vertex touches nothing.
@@ -64,6 +67,9 @@ const CONTACTS_A_THREAD: usize = 128;
 const MARGIN: f64 = 0.25;
 /// The sine of the angle between two edges up to which they count as parallel.
 const PARALLEL: f64 = 0.01;
+/// The square of the depth under both planes at an edge up to which the one that takes less to satisfy is chosen, in lengths
+/// of the edge.
+const SLIGHT: f64 = 1e-4;
 /// One over how many times the part of an overlap that is taken back a particle may be moved by.
 const PER_MOVE: f64 = 0.25;
 
@@ -528,20 +534,34 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
             return self.edge_gap(x, previous, kept);
         }
         let (now, old) = (basis::<R>(x), basis::<R>(previous));
-        let at = |plane: ContactPlane<R, 4>| Gap {
-            residual: new_part(self.above(&plane, now), self.above(&plane, old), kept),
-            plane,
-            is_past: false,
+        let at = |plane: ContactPlane<R, 4>| {
+            let height = self.above(&plane, now);
+            let gap = Gap {
+                residual: new_part(height, self.above(&plane, old), kept),
+                plane,
+                is_past: false,
+            };
+            (height, gap)
         };
-        let gap = at(self.own_plane(now)?);
-        if gap.is_open() {
-            return Some(gap);
+        let (height, mut gap) = at(self.own_plane(now)?);
+        if height < R::ZERO
+            && let Some(beyond) = self.plane_beyond(now)
+        {
+            let beyond = at(beyond);
+            let own = (height, gap);
+            let (shallow, deep) = if beyond.0 > height {
+                (beyond, own)
+            } else {
+                (own, beyond)
+            };
+            let slight = R::from_f64(SLIGHT) * R::dot(now[0], now[0]);
+            let is_slight = deep.0 * deep.0 < slight;
+            gap = if is_slight && deep.1.residual > shallow.1.residual {
+                deep.1
+            } else {
+                shallow.1
+            };
         }
-        let beyond = self.plane_beyond(now).map(at);
-        let mut gap = match beyond {
-            Some(beyond) if beyond.residual > gap.residual => beyond,
-            _ => gap,
-        };
         gap.is_past = !gap.is_open() && self.is_past(now);
         Some(gap)
     }
