@@ -72,8 +72,8 @@ struct Slices {
     find_ms: [f64; 3],
     /// Mean of a frame, in ms.
     ms: f64,
-    /// Largest depth on the way, in mean edges.
-    deepest: f64,
+    /// Largest depth of a frame: mean and largest; and the mean of the 99th percentile. In mean edges.
+    depths: [f64; 3],
     buried: usize,
 }
 
@@ -259,7 +259,8 @@ fn slices(young_modulus: f64, quick: bool) -> anyhow::Result<Slices> {
     }
     let last = &reports[30..];
     let find = || last.iter().map(|report| report.ms.contact);
-    let contacts = last.iter().filter_map(|report| report.contact);
+    let contacts: Vec<_> = last.iter().filter_map(|report| report.contact).collect();
+    let deepest = || contacts.iter().map(|contact| contact.max_depth);
     let end = simulation.report().contact.unwrap_or_default();
     Ok(Slices {
         young_modulus,
@@ -267,9 +268,11 @@ fn slices(young_modulus: f64, quick: bool) -> anyhow::Result<Slices> {
         active: end.active,
         find_ms: [mean(find()), median(find()), find().fold(0.0, f64::max)],
         ms: mean(last.iter().map(|report| report.ms.total)),
-        deepest: contacts
-            .map(|contact| contact.max_depth)
-            .fold(0.0, f64::max),
+        depths: [
+            mean(deepest()),
+            deepest().fold(0.0, f64::max),
+            mean(contacts.iter().map(|contact| contact.depth_p99)),
+        ],
         buried: end.buried,
     })
 }
@@ -374,7 +377,8 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             "active",
             "ms of finding, mean, median and largest",
             "ms of a frame, mean",
-            "largest depth on the way, in mean edges",
+            "largest depth of a frame, mean and largest, in mean edges",
+            "99% of the contacts below, mean",
             "buried",
         ],
     );
@@ -428,7 +432,12 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
                 row.active.to_string(),
                 row.find_ms.map(|ms| format!("{ms:.1}")).join(", "),
                 format!("{:.1}", row.ms),
-                format!("{:.0}%", 100.0 * row.deepest),
+                format!(
+                    "{:.0}%, {:.0}%",
+                    100.0 * row.depths[0],
+                    100.0 * row.depths[1]
+                ),
+                format!("{:.1}%", 100.0 * row.depths[2]),
                 row.buried.to_string(),
             ]),
             Row::Depth(depth) => {

@@ -1,6 +1,6 @@
-// Contacts: pairs of particles across a fresh cut, vertices against triangles, and edges against edges. A thread solves a contact; those of a
-// dispatch, or of a step of a tail, share no particle. Twin: `contacts.rs` of incise-xpbd, which explains the equations;
-// the order of operations is equal.
+// Contacts: pairs of particles across a fresh cut, vertices against triangles, and edges against edges. A thread solves a
+// contact; those of a dispatch, or of a step of a tail, share no particle. Twin: `contacts.rs` of incise-xpbd, which
+// explains the equations; the order of operations is equal.
 
 // True if multipliers are kept from one iteration to the next.
 override KEEPS: bool = false;
@@ -54,6 +54,9 @@ struct Plane {
 // A contact at the present positions.
 struct Gap {
     plane: Plane,
+    // Below 0 in an overlap.
+    value: f32,
+    // The value without the part of an old overlap that the substep leaves.
     residual: f32,
     // Whether the vertex is past the end of the surface, so that there is no contact whatever the residual says.
     is_past: bool,
@@ -183,28 +186,33 @@ fn is_past(at: Basis, limit: vec4<f32>, thickness: f32) -> bool {
     return dot(outward.xyz, at.r - at.e1 * part) > limit.w + thickness;
 }
 
+fn gap_to(plane: Plane, now: Basis, old: Basis, thickness: f32) -> Gap {
+    let value = above(now, plane, thickness);
+    return Gap(plane, value, new_part(value, above(old, plane, thickness)), false);
+}
+
 fn face_gap(contact: Contact) -> Gap {
     let now = basis_now(contact);
     let old = basis_old(contact);
     let thickness = contact.beyond.w;
     let own = own_plane(now);
     if !own.exists {
-        return Gap(own, 0.0, false);
+        return Gap(own, 0.0, 0.0, false);
     }
-    let height = above(now, own, thickness);
-    var gap = Gap(own, new_part(height, above(old, own, thickness)), false);
-    if height < 0.0 {
+    var gap = gap_to(own, now, old, thickness);
+    if gap.value < 0.0 {
         let beyond = plane_beyond(now, contact.beyond.xyz);
         if beyond.exists {
-            let other_height = above(now, beyond, thickness);
-            let other = Gap(beyond, new_part(other_height, above(old, beyond, thickness)), false);
-            // The less deep one, or in a slight overlap the one that takes less to satisfy.
-            let deepest = min(height, other_height);
-            let is_slight = deepest * deepest < SLIGHT * dot(now.e1, now.e1);
-            let is_other_less_deep = other_height > height;
-            let is_deeper_better = select(other.residual > gap.residual, gap.residual > other.residual, is_other_less_deep);
-            if is_other_less_deep != (is_slight && is_deeper_better) {
-                gap = other;
+            var shallow = gap;
+            var deep = gap_to(beyond, now, old, thickness);
+            if deep.value > shallow.value {
+                shallow = deep;
+                deep = gap;
+            }
+            let is_slight = deep.value * deep.value < SLIGHT * dot(now.e1, now.e1);
+            gap = shallow;
+            if is_slight && deep.residual > shallow.residual {
+                gap = deep;
             }
         }
     }
@@ -214,7 +222,7 @@ fn face_gap(contact: Contact) -> Gap {
 
 // The gap between two edges through their closest points.
 fn edge_gap(contact: Contact) -> Gap {
-    let none = Gap(no_plane(), 0.0, false);
+    let none = Gap(no_plane(), 0.0, 0.0, false);
     let along = direction(contact.now[1].xyz - contact.now[0].xyz);
     let other = direction(contact.now[3].xyz - contact.now[2].xyz);
     if !(along.w > 0.0 && other.w > 0.0) {
@@ -247,7 +255,7 @@ fn edge_gap(contact: Contact) -> Gap {
         + (contact.old[3] - contact.old[2]) * shares.w;
     let value = dot(plane.normal, now) - contact.beyond.w;
     let before = dot(plane.normal, old) - contact.beyond.w;
-    return Gap(plane, new_part(value, before), is_past);
+    return Gap(plane, value, new_part(value, before), is_past);
 }
 
 fn pair_plane(contact: Contact) -> Plane {
@@ -265,7 +273,7 @@ fn gap_of(contact: Contact) -> Gap {
     let plane = pair_plane(contact);
     let value = dot(plane.normal, contact.now[1].xyz - contact.now[0].xyz);
     let before = dot(plane.normal, contact.old[1] - contact.old[0]);
-    return Gap(plane, new_part(value, before), false);
+    return Gap(plane, value, new_part(value, before), false);
 }
 
 // The first or the second plane.

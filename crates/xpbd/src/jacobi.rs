@@ -2,8 +2,8 @@
 //!
 //! Corrections are summed color by color, so that no two threads add to one particle at once and every sum has a fixed
 //! order. Chebyshev's semi-iteration then extrapolates along the line through the iterate before last:
-//! `x ← x̂ + (ω - 1) (x̂ - x⁻)` with x̂ the Jacobi iterate and x⁻ the one before last; with ω = 1 that is x̂, to the bit. Multipliers are extrapolated in the same
-//! way, so that they match the positions.
+//! `x ← x̂ + (ω - 1) (x̂ - x⁻)` with x̂ the Jacobi iterate and x⁻ the one before last. In this form ω = 1 is Jacobi to the
+//! bit. Multipliers are extrapolated in the same way, so that they match the positions.
 //!
 //! Source: Wang 2015, algorithm 1, for the extrapolation; paper section 5.3 for the comparison.
 //! Cost: that of a Gauss-Seidel pass, a pass over the particles, and with Chebyshev two more copies of the state.

@@ -263,6 +263,8 @@ struct ContactPlane<R: Float, const K: usize> {
 struct Gap<R: Float, const K: usize> {
     /// The plane that it acts along.
     plane: ContactPlane<R, K>,
+    /// `C`, below 0 in an overlap.
+    value: R,
     /// `C` without the part of an old overlap that the substep leaves.
     residual: R,
     /// Whether the vertex is past the end of the surface, so that there is no contact whatever `C` says.
@@ -386,6 +388,7 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
         let before = R::dot(self.normal, previous[1] - previous[0]);
         Some(Gap {
             plane: self.plane(x, false)?,
+            value,
             residual: new_part(value, before, kept),
             is_past: false,
         })
@@ -508,9 +511,11 @@ impl<R: Float> Surface<R> {
             let way = (x[0] - x[2]) + (x[1] - x[0]) * first + (x[3] - x[2]) * second;
             R::dot(plane.normal, way) - self.thickness
         };
+        let value = between(x);
         Some(Gap {
             plane,
-            residual: new_part(between(x), between(previous), kept),
+            value,
+            residual: new_part(value, between(previous), kept),
             is_past,
         })
     }
@@ -535,31 +540,31 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
         }
         let (now, old) = (basis::<R>(x), basis::<R>(previous));
         let at = |plane: ContactPlane<R, 4>| {
-            let height = self.above(&plane, now);
-            let gap = Gap {
-                residual: new_part(height, self.above(&plane, old), kept),
+            let value = self.above(&plane, now);
+            Gap {
+                residual: new_part(value, self.above(&plane, old), kept),
+                value,
                 plane,
                 is_past: false,
-            };
-            (height, gap)
+            }
         };
-        let (height, mut gap) = at(self.own_plane(now)?);
-        if height < R::ZERO
+        let own = at(self.own_plane(now)?);
+        let mut gap = own;
+        if own.value < R::ZERO
             && let Some(beyond) = self.plane_beyond(now)
         {
             let beyond = at(beyond);
-            let own = (height, gap);
-            let (shallow, deep) = if beyond.0 > height {
+            let (shallow, deep) = if beyond.value > own.value {
                 (beyond, own)
             } else {
                 (own, beyond)
             };
-            let slight = R::from_f64(SLIGHT) * R::dot(now[0], now[0]);
-            let is_slight = deep.0 * deep.0 < slight;
-            gap = if is_slight && deep.1.residual > shallow.1.residual {
-                deep.1
+            let edge = now[0];
+            let is_slight = deep.value * deep.value < R::from_f64(SLIGHT) * R::dot(edge, edge);
+            gap = if is_slight && deep.residual > shallow.residual {
+                deep
             } else {
-                shallow.1
+                shallow
             };
         }
         gap.is_past = !gap.is_open() && self.is_past(now);
@@ -921,7 +926,7 @@ impl<R: Float> Contacts<R> {
     ) -> ContactState {
         let x = contact.particles().map(|p| particles.vector(p as usize));
         let gap = contact.gap(x, x, R::ZERO);
-        let mut depth = gap.map_or(0.0, |gap| -gap.residual.to_f64());
+        let mut depth = gap.map_or(0.0, |gap| -gap.value.to_f64());
         // Below the plane of a triangle but beside the triangle, a vertex is not inside.
         if gap.is_some_and(|gap| gap.is_past) || !contact.is_opposite(x) {
             depth = depth.min(0.0);
