@@ -11,8 +11,8 @@ const NONE: u32 = 0xffffffffu;
 const PARALLEL_SQUARED: f32 = 0.0001;
 // One over how many times the part of an overlap that is taken back a particle may be moved by.
 const PER_MOVE: f32 = 0.25;
-// The square of the depth under both planes at an edge up to which the one that takes less to satisfy is chosen, in
-// lengths of the edge.
+// The square of the depth under both planes at an edge up to which the one acts that takes less to satisfy, in lengths of
+// the edge.
 const SLIGHT: f32 = 1e-4;
 
 struct ContactUniform {
@@ -186,9 +186,12 @@ fn is_past(at: Basis, limit: vec4<f32>, thickness: f32) -> bool {
     return dot(outward.xyz, at.r - at.e1 * part) > limit.w + thickness;
 }
 
-fn gap_to(plane: Plane, now: Basis, old: Basis, thickness: f32) -> Gap {
-    let value = above(now, plane, thickness);
-    return Gap(plane, value, new_part(value, above(old, plane, thickness)), false);
+fn gap_to(plane: Plane, value: f32, before: f32) -> Gap {
+    return Gap(plane, value, new_part(value, before), false);
+}
+
+fn is_slight(before: f32, slight: f32) -> bool {
+    return before >= 0.0 || before * before < slight;
 }
 
 fn face_gap(contact: Contact) -> Gap {
@@ -199,20 +202,20 @@ fn face_gap(contact: Contact) -> Gap {
     if !own.exists {
         return Gap(own, 0.0, 0.0, false);
     }
-    var gap = gap_to(own, now, old, thickness);
+    let before = above(old, own, thickness);
+    var gap = gap_to(own, above(now, own, thickness), before);
     if gap.value < 0.0 {
         let beyond = plane_beyond(now, contact.beyond.xyz);
         if beyond.exists {
-            var shallow = gap;
-            var deep = gap_to(beyond, now, old, thickness);
-            if deep.value > shallow.value {
-                shallow = deep;
-                deep = gap;
+            let other_before = above(old, beyond, thickness);
+            let other = gap_to(beyond, above(now, beyond, thickness), other_before);
+            let slight = SLIGHT * dot(now.e1, now.e1);
+            var acts = other_before > before;
+            if other.value >= 0.0 || (is_slight(before, slight) && is_slight(other_before, slight)) {
+                acts = other.residual > gap.residual;
             }
-            let is_slight = deep.value * deep.value < SLIGHT * dot(now.e1, now.e1);
-            gap = shallow;
-            if is_slight && deep.residual > shallow.residual {
-                gap = deep;
+            if acts {
+                gap = other;
             }
         }
     }

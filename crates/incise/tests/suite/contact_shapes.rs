@@ -266,8 +266,8 @@ fn pinned_bodies_have_no_contacts_of_their_own() {
 #[test]
 fn results_with_contact_are_those_of_the_last_version() {
     for (precision, golden) in [
-        (Precision::F32, 0x11a8_d1bf_0c4d_e992),
-        (Precision::F64, 0x1d7a_4555_f75f_5a69),
+        (Precision::F32, 0xfa97_2aa4_21c2_9eff),
+        (Precision::F64, 0x2050_879c_b511_f6d1),
     ] {
         for threads in [1, 3] {
             let mut simulation = busy(precision, threads).build().unwrap();

@@ -15,12 +15,12 @@
 //! directions tells inside from outside only as long as they have not turned past each other.
 //!
 //! Near a convex edge a vertex is outside if it is outside of one of both surfaces that meet there. So a contact may
-//! have a second plane, that of the surface beyond an edge of its triangle, and of both it acts along the one that the
-//! vertex is less deep under. With one plane only, or with a normal in between, a vertex of a floor catches the front of a
-//! block that slides over it. The normal of the second plane is given in the basis of the triangle, so it turns with it.
-//! The overlap of contacts at rest must not catch either: where the vertex is under neither by more than 1% of the edge,
-//! the contact acts along the plane that takes less to satisfy. A deep overlap must not have that choice: a vertex on its
-//! way out of one plane could go ever deeper under the other.
+//! have a second plane, that of the surface beyond an edge of its triangle. With one plane only, or with a normal in
+//! between, a vertex of a floor catches the front of a block that slides over it. A vertex inside is held by the plane that
+//! it was less deep under when the substep began: it came in through that one. So the smaller of both depths never grows,
+//! and nothing is pushed out of a surface that it did not pass. The slight overlaps of contacts at rest must not catch
+//! either: if it was under neither plane by more than 1% of the edge, the one acts that takes less to satisfy. The normal
+//! of the second plane is given in the basis of the triangle, so it turns with it.
 //!
 //! A plane has no end, a surface has: past a rim a vertex would be held where there is nothing below it. So a contact may
 //! have a limit, a direction away from the nearest edge and a distance along it beyond which the vertex touches nothing.
@@ -67,8 +67,8 @@ const CONTACTS_A_THREAD: usize = 128;
 const MARGIN: f64 = 0.25;
 /// The sine of the angle between two edges up to which they count as parallel.
 const PARALLEL: f64 = 0.01;
-/// The square of the depth under both planes at an edge up to which the one that takes less to satisfy is chosen, in lengths
-/// of the edge.
+/// The square of the depth under both planes at an edge up to which the one acts that takes less to satisfy, in lengths of
+/// the edge.
 const SLIGHT: f64 = 1e-4;
 /// One over how many times the part of an overlap that is taken back a particle may be moved by.
 const PER_MOVE: f64 = 0.25;
@@ -540,32 +540,31 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
         }
         let (now, old) = (basis::<R>(x), basis::<R>(previous));
         let at = |plane: ContactPlane<R, 4>| {
-            let value = self.above(&plane, now);
-            Gap {
-                residual: new_part(value, self.above(&plane, old), kept),
-                value,
+            let [value, before] = [now, old].map(|basis| self.above(&plane, basis));
+            let gap = Gap {
                 plane,
+                value,
+                residual: new_part(value, before, kept),
                 is_past: false,
-            }
+            };
+            (gap, before)
         };
-        let own = at(self.own_plane(now)?);
-        let mut gap = own;
-        if own.value < R::ZERO
+        let (mut gap, before) = at(self.own_plane(now)?);
+        if gap.value < R::ZERO
             && let Some(beyond) = self.plane_beyond(now)
         {
-            let beyond = at(beyond);
-            let (shallow, deep) = if beyond.value > own.value {
-                (beyond, own)
+            let (other, other_before) = at(beyond);
+            let [edge, ..] = now;
+            let slight = R::from_f64(SLIGHT) * R::dot(edge, edge);
+            let is_slight = |before: R| before >= R::ZERO || before * before < slight;
+            let acts = if other.value >= R::ZERO || is_slight(before) && is_slight(other_before) {
+                other.residual > gap.residual
             } else {
-                (own, beyond)
+                other_before > before
             };
-            let edge = now[0];
-            let is_slight = deep.value * deep.value < R::from_f64(SLIGHT) * R::dot(edge, edge);
-            gap = if is_slight && deep.residual > shallow.residual {
-                deep
-            } else {
-                shallow
-            };
+            if acts {
+                gap = other;
+            }
         }
         gap.is_past = !gap.is_open() && self.is_past(now);
         Some(gap)
