@@ -76,6 +76,8 @@ const WHOLE: f64 = 2.0;
 const MOST: f64 = 0.02;
 /// The part of the skin within which surfaces count as near. The rest saves searches: bodies at rest shake by less.
 const NEAR: f64 = 0.5;
+/// The motion of a part as a whole is fitted to at least so many of its vertices, and to all if it has fewer.
+const FITTED: u32 = 512;
 
 /// What an update changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -1216,15 +1218,22 @@ fn fit(
     let number = part_of.iter().map(|&part| part as usize);
     parts.clear();
     parts.resize(number.clone().max().map_or(0, |most| most + 1), Part::EMPTY);
+    for part in number.clone() {
+        parts[part].vertices += 1;
+    }
     for (i, (part, &vertex)) in number.zip(vertices).enumerate() {
         let part = &mut parts[part];
         part.body = body_of[vertex as usize];
-        part.vertices += 1;
         let (places, moved) = motion(i, vertex);
         let step = places[1] - places[0];
         part.steps = part.steps.union(Bounds::around([step]));
+        let is_fitted = part.seen.is_multiple_of((part.vertices / FITTED).max(1));
+        part.seen += 1;
         for (motion, (x, by)) in part.motions.iter_mut().zip(places.into_iter().zip(moved)) {
-            motion.add(x, by);
+            motion.cover(x);
+            if is_fitted {
+                motion.add(x, by);
+            }
         }
     }
     let motions = parts.iter_mut().flat_map(|part| &mut part.motions);

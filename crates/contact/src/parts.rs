@@ -7,6 +7,8 @@
 //! come closer by what the rigid motions differ by where the parts are near each other. A bound by displacements alone
 //! would ask for a search in each frame in which something turns.
 //!
+//! Any rigid motion gives a bound, so a large part is fitted to some of its vertices only.
+//!
 //! Cost: two passes over the vertices, and a few dozen operations for two parts that are near each other.
 
 use glam::{DMat3, DQuat, DVec3};
@@ -73,6 +75,8 @@ pub(crate) struct Motion {
     spin: DVec3,
     /// The rotation back.
     back: DQuat,
+    /// The same.
+    turn: DMat3,
 }
 
 impl Motion {
@@ -85,9 +89,15 @@ impl Motion {
         at: DVec3::ZERO,
         spin: DVec3::ZERO,
         back: DQuat::IDENTITY,
+        turn: DMat3::IDENTITY,
     };
 
-    /// Adds a point that has moved by some way.
+    /// Adds a point to what the bounds are around.
+    pub(crate) fn cover(&mut self, x: DVec3) {
+        self.bounds = self.bounds.union(Bounds::around([x]));
+    }
+
+    /// Adds a point that has moved by some way to those that the motion is fitted to.
     pub(crate) fn add(&mut self, x: DVec3, by: DVec3) {
         let middle = x - by / 2.0;
         if self.count == 0.0 {
@@ -98,7 +108,6 @@ impl Motion {
         self.center += from;
         let [a, b, c] = from.to_array();
         self.squares += DMat3::from_cols(from * a, from * b, from * c);
-        self.bounds = self.bounds.union(Bounds::around([x]));
         self.at += by;
         self.spin += from.cross(by);
     }
@@ -122,12 +131,13 @@ impl Motion {
         // A part on a line has no rotation about it: any other motion will do, it leaves larger rests.
         self.spin = if spin.is_finite() { spin } else { DVec3::ZERO };
         self.back = DQuat::from_vec4((-self.spin / 2.0).extend(1.0)).normalize();
+        self.turn = DMat3::from_quat(self.back);
     }
 
     /// The displacement of a place by the rigid motion.
     pub(crate) fn of(&self, x: DVec3) -> DVec3 {
         let from = x - self.center;
-        self.at + from - self.back * from
+        self.at + from - self.turn * from
     }
 
     /// The map from present places to those before the motion.
@@ -140,7 +150,7 @@ impl Motion {
 
     /// What has moved beside this motion by `rest`, on top of `before`, since a time before.
     pub(crate) fn carry(&self, before: DVec3, rest: DVec3) -> DVec3 {
-        self.back.inverse() * (before + rest)
+        self.turn.transpose_mul_vec3(before + rest)
     }
 
     /// A bound on what displacements of two motions differ by, so small that rotations are linear, where points of both are
@@ -167,6 +177,8 @@ impl Motion {
 pub(crate) struct Part {
     pub(crate) body: u32,
     pub(crate) vertices: u32,
+    /// How many of them were looked at, while they are.
+    pub(crate) seen: u32,
     /// Whether another part that it may touch is near.
     pub(crate) is_near: bool,
     /// Around what its vertices go in the frame.
@@ -180,6 +192,7 @@ impl Part {
     pub(crate) const EMPTY: Self = Self {
         body: NONE,
         vertices: 0,
+        seen: 0,
         is_near: false,
         steps: Bounds::EMPTY,
         motions: [Motion::NONE; 2],
@@ -228,7 +241,10 @@ mod tests {
 
     fn motion(points: &Moved) -> Motion {
         let mut motion = Motion::NONE;
-        points.iter().for_each(|&(x, by)| motion.add(x, by));
+        for &(x, by) in points {
+            motion.cover(x);
+            motion.add(x, by);
+        }
         motion.fit();
         motion
     }

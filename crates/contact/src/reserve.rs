@@ -135,7 +135,7 @@ impl Reserve {
         for ((by, rest), motion) in beside.by.iter_mut().zip(rests).zip(&part.motions) {
             *by = motion.carry(*by, rest);
         }
-        let longest = |ways: [DVec3; 2]| larger(ways.map(DVec3::length));
+        let longest = |ways: [DVec3; 2]| larger(ways.map(DVec3::length_squared)).sqrt();
         let (by, now) = (longest(rests), longest(beside.by));
         beside.way.note(by, now);
     }
