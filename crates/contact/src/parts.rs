@@ -75,7 +75,7 @@ pub(crate) struct Motion {
     spin: DVec3,
     /// The rotation back.
     back: DQuat,
-    /// The same.
+    /// [`Self::back`] as a matrix.
     turn: DMat3,
 }
 
