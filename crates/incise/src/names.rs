@@ -1,11 +1,17 @@
 //! [`suggestion`]: the known name that is most similar to an unknown one, for "did you mean" messages.
 
-/// Returns the known name that is most similar to `unknown`; `None` without any known name.
-#[must_use]
-pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    known
+/// Returns the known name that is most similar to `unknown`; `None` if none is similar.
+pub(crate) fn similar<'a>(
+    unknown: &str,
+    known: impl IntoIterator<Item = &'a str>,
+) -> Option<&'a str> {
+    let rated = known
         .into_iter()
-        .max_by(|a, b| similarity(unknown, a).total_cmp(&similarity(unknown, b)))
+        .map(|name| (similarity(unknown, name), name));
+    rated
+        .filter(|(similarity, _)| *similarity >= SIMILAR)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, name)| name)
 }
 
 /// Returns the end of a message about an unknown name: `; did you mean 'liver'?`, or nothing if no known name is
@@ -23,11 +29,9 @@ pub fn nearest<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> O
 #[must_use]
 pub fn suggestion<'a>(unknown: &str, known: impl IntoIterator<Item = &'a str>) -> String {
     let name = unknown.split(':').next().unwrap_or(unknown).to_lowercase();
-    match nearest(&name, known) {
-        Some(nearest) if similarity(&name, nearest) >= SIMILAR => {
-            format!("; did you mean '{nearest}'?")
-        }
-        _ => String::new(),
+    match similar(&name, known) {
+        Some(similar) => format!("; did you mean '{similar}'?"),
+        None => String::new(),
     }
 }
 

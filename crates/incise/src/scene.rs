@@ -27,6 +27,7 @@ mod schema;
 mod solver;
 mod stroke;
 mod substeps;
+mod wording;
 
 pub use attachment::{AttachmentSpec, PathRotationSpec};
 pub(crate) use check::check;
@@ -44,7 +45,9 @@ pub use stroke::{SolidBladeSpec, StrokeSpec};
 pub(crate) use stroke::{along, pose};
 pub use substeps::Substeps;
 
-pub use crate::names::{nearest, suggestion};
+use wording::in_scene_words;
+
+pub use crate::names::suggestion;
 
 /// A scene: TOML text, or the defaults with changes.
 ///
@@ -392,7 +395,7 @@ impl Scene {
                 .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
             Error::Parse {
                 line,
-                message: with_suggestion(error.message()),
+                message: in_scene_words(error.message()),
             }
         })?;
         scene.solver = scene.solver.with_defaults(text)?;
@@ -426,33 +429,6 @@ impl Scene {
     }
 }
 
-/// Adds the nearest known name to a message that lists what is known.
-fn with_suggestion(message: &str) -> String {
-    let message = message.trim_end().replace('\n', " ");
-    let (unknown, known): (&str, Vec<&str>) =
-        if let Some(names) = message.strip_prefix("unexpected keys in table: ") {
-            // As of a table with one of several sets of keys: `unexpected keys in table: a, available keys: b, c`.
-            let (unknown, known) = names
-                .split_once(", available keys: ")
-                .unwrap_or((names, ""));
-            let first = unknown.split(", ").next().unwrap_or(unknown);
-            (first, known.split(", ").collect())
-        } else if message.starts_with("unknown") {
-            // As in ``unknown field `a`, expected `b` or `c` ``.
-            let mut names = message.split('`').skip(1).step_by(2);
-            match names.next() {
-                Some(unknown) => (unknown, names.collect()),
-                None => return message,
-            }
-        } else {
-            return message;
-        };
-    match nearest(unknown, known.into_iter().filter(|name| !name.is_empty())) {
-        Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
-        None => format!("unknown key or value '{unknown}'"),
-    }
-}
-
 fn one() -> u64 {
     1
 }
@@ -477,24 +453,5 @@ mod tests {
     fn built_in_scene_survives_a_round_trip() {
         let scene = Scene::built_in();
         assert_eq!(Scene::from_toml(&scene.to_toml().unwrap()).unwrap(), scene);
-    }
-
-    #[test]
-    fn unknown_keys_name_the_nearest() {
-        let message = |text: &str| Scene::from_toml(text).unwrap_err().to_string();
-        assert_eq!(
-            message("[world]\ngravty = [0, 0, 0]"),
-            "line 2: unknown key or value 'gravty': did you mean 'gravity'?"
-        );
-        assert!(message("[solver]\nmethod = \"gaus-seidel\"").contains("'gauss-seidel'"));
-        assert!(message("[[stroke]]\nkind = \"plain\"").contains("'plane'"));
-        assert!(message("[[body]]\nfixed = [{ halfspace = {} }]").contains("'half_space'"));
-        assert!(
-            message(
-                "[[stroke]]\nkind = \"plane\"\nframe = 1\npoint=[0,0,0]\nnormal=[0,0,1]\nsnp=1"
-            )
-            .contains("'snap'")
-        );
-        assert!(message("[world\n").starts_with("line 1: "));
     }
 }

@@ -421,6 +421,10 @@ impl Simulation {
             let warning = Warning::of_missed_stroke(missed, nearest);
             self.state.report.warnings.push(warning);
         }
+        let has_ground = self.state.scene.world.ground.is_some();
+        if self.state.clock.next_frame == 0 && has_ground && self.state.gravity.is_none() {
+            self.state.report.warnings.push(Warning::of_no_gravity());
+        }
         let of_strokes = self.state.timeline.take_warnings();
         self.state.report.warnings.extend(of_strokes);
         for island in &mut self.state.islands {

@@ -42,6 +42,8 @@ pub enum WarningCode {
     EmptyRegion,
     /// A body starts inside the ground or a collider.
     StartsInside,
+    /// The scene has a ground and says nothing about gravity, so nothing falls onto it.
+    NoGravity,
     /// A stroke has ended without meeting a tet.
     StrokeMissed,
     /// A stroke has cut where pinned particles keep both sides together.
@@ -99,6 +101,15 @@ impl Warning {
             "it starts {depth} m inside {collider}, which pushes it out: move one of them by {depth} m"
         );
         Self::new(WarningCode::StartsInside, &[body], message)
+    }
+
+    /// The warning about a ground in a scene without gravity.
+    pub(crate) fn of_no_gravity() -> Self {
+        Self {
+            code: WarningCode::NoGravity,
+            message: "there is a ground and no gravity, so nothing falls onto it: set gravity = [0.0, 0.0, -9.81], or [0.0, 0.0, 0.0] if bodies are to float".into(),
+            location: "world".into(),
+        }
     }
 
     /// The warning about a stroke that met no tet, at a place like `stroke[0]`, with the nearest body and its box when

@@ -86,6 +86,10 @@ impl<'de> Deserialize<'de> for Substeps {
             fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Substeps, E> {
                 match name {
                     "auto" => Ok(Substeps::Auto),
+                    // A number in quotes is no misspelled word.
+                    _ if name.parse::<f64>().is_ok() => {
+                        Err(E::invalid_value(Unexpected::Str(name), &self))
+                    }
                     _ => Err(E::unknown_variant(name, &["auto"])),
                 }
             }

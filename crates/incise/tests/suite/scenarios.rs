@@ -237,3 +237,32 @@ fn bodies_that_start_inside_colliders_are_named_and_rise_slowly() {
         "{apart:?}"
     );
 }
+
+/// Nothing falls without gravity, which a newcomer with a ground does not expect; one who asks for none does.
+#[test]
+fn a_ground_without_gravity_is_named_once() {
+    let text = |world: &str| {
+        format!(
+            "[world]\n{world}\n[[body]]\nshape = {{ kind = \"box\", tets = 200 }}\nposition = [0.0, 0.0, 1.0]\n"
+        )
+    };
+    let ground = "ground = { height = 0.0 }";
+    for (world, expected) in [
+        (ground.to_owned(), true),
+        (format!("{ground}\ngravity = [0.0, 0.0, 0.0]"), false),
+        (format!("{ground}\ngravity = [0.0, 0.0, -9.81]"), false),
+        (String::new(), false),
+    ] {
+        let mut simulation = simulation(&scene(&text(&world)));
+        for frame in 0..2 {
+            let report = simulation.step().unwrap();
+            let mut warnings = report.warnings().iter();
+            let warning = warnings.find(|w| w.code == WarningCode::NoGravity);
+            assert_eq!(
+                warning.is_some(),
+                expected && frame == 0,
+                "{world}, {frame}"
+            );
+        }
+    }
+}

@@ -174,7 +174,7 @@ fn stated_ranges_are_the_accepted_ones() {
                 let sentence = refused.lines().next().unwrap();
                 // A value that its type refuses is named by its line.
                 assert!(
-                    sentence.contains(&key[..]) || sentence.contains("invalid value: integer"),
+                    sentence.contains(&key[..]) || sentence.contains("expected a whole number"),
                     "{name}.{key} = {bad}: {refused}"
                 );
                 // A body of 1e9 m may be refused for another reason, but not by this range.

@@ -1,0 +1,194 @@
+//! [`in_scene_words`]: messages of the TOML reader in the words of scene files.
+//!
+//! The reader speaks of Rust: `invalid value: integer -5, expected usize`. Those who write scenes know lists, tables,
+//! numbers and keys. Cost: that of the message.
+
+use crate::names::similar;
+
+/// A message of the TOML reader about a wrong type or value, a missing key, or an unknown name, in the words of scene files;
+/// other messages stay. An unknown name comes with the known one that is most similar, or with all.
+pub(super) fn in_scene_words(message: &str) -> String {
+    let message = message.trim_end().replace('\n', " ");
+    if let Some(names) = message.strip_prefix("unexpected keys in table: ") {
+        // From a table with one of several sets of keys: `unexpected keys in table: a, available keys: b, c`.
+        let (unknown, known) = names
+            .split_once(", available keys: ")
+            .unwrap_or((names, ""));
+        let first = unknown.split(", ").next().unwrap_or(unknown);
+        return unknown_name(first, &known.split(", ").collect::<Vec<_>>());
+    }
+    if message.starts_with("unknown") {
+        // ``unknown field `a`, expected `b` or `c` ``.
+        let mut names = message.split('`').skip(1).step_by(2);
+        if let Some(unknown) = names.next() {
+            return unknown_name(unknown, &names.collect::<Vec<_>>());
+        }
+    }
+    if let Some(field) = message.strip_prefix("missing field ") {
+        return format!("the key {} is missing", field.replace('`', "'"));
+    }
+    for beginning in ["invalid type: ", "invalid value: ", "invalid length "] {
+        let parts = message.strip_prefix(beginning);
+        if let Some((given, wanted)) = parts.and_then(|parts| parts.split_once(", expected ")) {
+            if (given, wanted) == ("map", "a sequence") {
+                return "expected a list, found a table: each of its tables begins with two brackets, as in [[body]]".to_owned();
+            }
+            let given = if beginning == "invalid length " {
+                format!("a list of {given}")
+            } else {
+                given_value(given)
+            };
+            return format!("expected {}, found {given}", wanted_value(wanted));
+        }
+    }
+    message
+}
+
+fn unknown_name(unknown: &str, known: &[&str]) -> String {
+    let known: Vec<&str> = known
+        .iter()
+        .copied()
+        .filter(|name| !name.is_empty())
+        .collect();
+    match similar(unknown, known.iter().copied()) {
+        Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
+        None if known.is_empty() => format!("unknown key or value '{unknown}'"),
+        None => format!(
+            "unknown key or value '{unknown}': known are '{}'",
+            known.join("', '")
+        ),
+    }
+}
+
+/// What was wanted: `f64` and the like, or words already.
+fn wanted_value(wanted: &str) -> String {
+    let words = match wanted {
+        // No integer of TOML is too large for 64 bits.
+        "usize" | "u64" => "a whole number of at least 0",
+        "u32" => "a whole number from 0 to 4294967295",
+        "a nonzero u32" => "a whole number from 1 to 4294967295",
+        "f32" | "f64" => "a number",
+        "a boolean" => "true or false",
+        "a sequence" => "a list",
+        "a map" => "a table",
+        "a string" | "variant identifier" => "text in quotes",
+        "path string" => "a path in quotes",
+        _ if wanted.starts_with("struct ") || wanted.ends_with(" enum") => "a table",
+        _ => return wanted.replace("an array of length ", "a list of "),
+    };
+    words.to_owned()
+}
+
+/// What was given: ``integer `3` ``, `string "a"`, `map` and the like.
+fn given_value(given: &str) -> String {
+    match given {
+        "sequence" => return "a list".to_owned(),
+        "map" => return "a table".to_owned(),
+        _ => {}
+    }
+    let kinds = ["integer ", "floating point ", "boolean ", "string "];
+    let value = kinds.iter().find_map(|kind| given.strip_prefix(kind));
+    match value {
+        Some(value) => value.trim_end_matches(" as i128").replace('`', ""),
+        None => given.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Scene;
+
+    fn message(text: &str) -> String {
+        Scene::from_toml(text).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn wrong_types_are_named_as_in_a_scene() {
+        let shape =
+            |rest: &str| message(&format!("[[body]]\nshape = {{ kind = \"liver\", {rest} }}"));
+        let whole = "line 2: expected a whole number of at least 0, found";
+        assert_eq!(shape("tets = -5"), format!("{whole} -5"));
+        assert_eq!(shape("tets = 0.5"), format!("{whole} 0.5"));
+        assert_eq!(shape("tets = [4, 4]"), format!("{whole} a list"));
+        let given = |text: &str| message(text).replace("line 2: ", "");
+        let cases = [
+            (
+                "[world]\ngravity = -9.81",
+                "expected a list of 3, found -9.81",
+            ),
+            (
+                "[world]\ngravity = [0, 1]",
+                "expected a list of 3, found a list of 2",
+            ),
+            ("[world]\nground = 0.0", "expected a table, found 0.0"),
+            (
+                "[cutting]\nimprove = \"yes\"",
+                "expected true or false, found \"yes\"",
+            ),
+            (
+                "[contact]\nfriction = true",
+                "expected a number, found true",
+            ),
+            ("[[body]]\nmesh = 3", "expected a path in quotes, found 3"),
+            ("[[body]]\nfixed = 3", "expected a list, found 3"),
+            ("[[stroke]]\nkind = 3", "expected text in quotes, found 3"),
+            (
+                "[solver]\nsubsteps = \"10\"",
+                "expected a number of substeps or \"auto\", found \"10\"",
+            ),
+            (
+                "[solver]\nsubsteps = 99999999999999999999",
+                "expected a number of substeps or \"auto\", found 99999999999999999999",
+            ),
+        ];
+        for (text, words) in cases {
+            assert_eq!(given(text), words, "{text}");
+        }
+        let one = message("[body]\nmesh = \"a.msh\"");
+        assert!(one.contains("as in [[body]]"), "{one}");
+        assert_eq!(
+            message("contact = true"),
+            "line 1: expected a table, found true"
+        );
+        assert_eq!(
+            message("[[stroke]]\nkind = \"plane\"\nframe = 1\npoint = [0, 0, 0]"),
+            "line 1: the key 'normal' is missing"
+        );
+    }
+
+    #[test]
+    fn unknown_keys_name_the_nearest() {
+        assert_eq!(
+            message("[world]\ngravty = [0, 0, 0]"),
+            "line 2: unknown key or value 'gravty': did you mean 'gravity'?"
+        );
+        assert!(message("[solver]\nmethod = \"gaus-seidel\"").contains("'gauss-seidel'"));
+        assert!(message("[[stroke]]\nkind = \"plain\"").contains("'plane'"));
+        assert!(message("[[body]]\nfixed = [{ halfspace = {} }]").contains("'half_space'"));
+        assert!(
+            message(
+                "[[stroke]]\nkind = \"plane\"\nframe = 1\npoint=[0,0,0]\nnormal=[0,0,1]\nsnp=1"
+            )
+            .contains("'snap'")
+        );
+        assert!(message("[world\n").starts_with("line 1: "));
+    }
+
+    #[test]
+    fn without_a_similar_name_all_are_listed() {
+        assert_eq!(
+            message("[world.ground]\nfloor = 1"),
+            "line 2: unknown key or value 'floor': known are 'height', 'friction'"
+        );
+        let of_body = message("[[body]]\ngenerate = 3");
+        assert!(of_body.contains("known are 'mesh', 'shape'"), "{of_body}");
+    }
+
+    #[test]
+    fn other_messages_stay() {
+        for text in ["invalid basic string", "unknown", "invalid type: what"] {
+            assert_eq!(in_scene_words(text), text);
+        }
+    }
+}
