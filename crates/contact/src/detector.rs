@@ -37,7 +37,7 @@ use crate::ahead::{Lookout, Near, Reach};
 use crate::edges::{EdgeContact, FeatureEdges, turn};
 use crate::face::FaceContact;
 use crate::index::{NONE, index};
-use crate::normals::{Owner, PlacedTriangle, Shape};
+use crate::normals::{Inversion, Owner, PlacedTriangle, Shape};
 use crate::pairs::{FreshPairs, PairContact};
 use crate::parts::{Motion, Part};
 use crate::query::{Found, Query, turn_away};
@@ -56,6 +56,8 @@ const PARALLEL: usize = 512;
 const SLID: f64 = 0.5;
 /// It has to have moved by this fraction of the near skin at least: on a sliver half a barycentric coordinate is nothing.
 const SLID_SKIN: f64 = 0.5;
+/// A tet is inverted if six times its volume is below minus this, in cubes of mean edges.
+const INVERTED: f64 = 1e-3;
 /// A vertex inside that has gone deeper by this fraction of the near skin is searched for again, before it gets out of reach.
 const DEEPER: f64 = 0.5;
 /// A candidate whose vertex lies beneath a point this far beyond its triangle is searched for again.
@@ -170,6 +172,8 @@ pub struct ContactDetector {
     inside: Vec<(ParticleId, TetId)>,
     /// The vertices inside another part without a triangle near them, ascending, each with whether it has no way out.
     deep: Vec<(ParticleId, bool)>,
+    /// The vertices that touch nothing of their own part, because a tet at them is or was inverted, ascending.
+    inverted: Vec<u32>,
     /// How many vertices the last update searched for.
     searched: usize,
     /// The surface vertices, ascending.
@@ -199,6 +203,9 @@ struct Room {
     last_candidates: Vec<FaceContact>,
     last_sightings: Vec<Sighting>,
     last_deep: Vec<(ParticleId, bool)>,
+    last_inverted: Vec<u32>,
+    /// By particle.
+    inversions: Vec<Inversion>,
     /// By particle.
     due: Vec<Due>,
     /// By particle the way that it goes in the frame.
@@ -249,6 +256,7 @@ impl ContactDetector {
             features_are_due: true,
             inside: Vec::new(),
             deep: Vec::new(),
+            inverted: Vec::new(),
             searched: 0,
             vertices: Vec::new(),
             parts: Vec::new(),
@@ -289,6 +297,7 @@ impl ContactDetector {
         self.location_is_due = true;
         self.inside.clear();
         self.deep.clear();
+        self.inverted.clear();
         self.face_candidates.clear();
         self.sightings.clear();
         self.edge_candidates.clear();
@@ -373,13 +382,14 @@ impl ContactDetector {
             *tet = before(*tet);
             particle.index() < delta.particles_before && tet.index() < delta.tets_before
         });
+        let is_known = |p: &u32| (*p as usize) < delta.particles_before;
+        self.inverted.retain(is_known);
         // Those that are left are searched for.
         self.face_candidates.clear();
         self.sightings.clear();
         self.deep.clear();
-        let is_left = |p: &u32| (*p as usize) < delta.particles_before;
         self.edge_candidates
-            .retain(|contact| contact.particles.iter().all(is_left));
+            .retain(|contact| contact.particles.iter().all(is_known));
         self.fresh_is_due = true;
         self.features_are_due = true;
         self.search_is_due = true;
@@ -482,7 +492,9 @@ impl ContactDetector {
         if !all {
             let mut look = |p: u32| due[p as usize] = due[p as usize].max(Due::Search);
             self.each_slid(state, &mut look);
-            retired.iter().copied().for_each(look);
+            let is_back = |p: &u32| !self.is_inverted(state, ParticleId(*p));
+            let back = self.inverted.iter().filter(|p| is_back(p));
+            back.chain(retired).copied().for_each(look);
         }
         let is_due = |least: Due| self.vertices.iter().any(|&p| due[p as usize] >= least);
         let has_moved = is_due(Due::Moved);
@@ -499,6 +511,16 @@ impl ContactDetector {
             self.reserve.mark();
         }
         asked
+    }
+
+    /// Whether a tet behind a triangle around a vertex is inverted.
+    fn is_inverted(&self, state: &ContactState<'_>, vertex: ParticleId) -> bool {
+        let tets = &state.mesh.mesh().tets;
+        let mut fan = self.surface.fan(vertex);
+        fan.any(|triangle| {
+            let corners = tets[triangle.tet.index()].map(|p| state.positions[p.index()]);
+            is_inverted(corners, self.mean_edge)
+        })
     }
 
     /// Notes the vertices that have moved out of their reserve, which starts over for them; whether all are due.
@@ -779,14 +801,16 @@ impl ContactDetector {
             placed,
             steps,
             due,
+            inversions,
             ..
         } = &mut self.room;
         let count = self.surface.slot_count();
+        let edge = self.mean_edge;
         boxes.resize(count, Box32::EMPTY);
         placed.resize(count, PlacedTriangle::default());
         let (surface, body_of) = (&self.surface, &self.body_of);
         let prepare = |(slot, (bounds, placed)): (usize, (&mut Box32, &mut PlacedTriangle))| {
-            (*bounds, *placed) = prepared(surface, body_of, state, index(slot));
+            (*bounds, *placed) = prepared(surface, body_of, state, edge, index(slot));
             let corners = surface.triangle(index(slot)).particles.map(|p| p.index());
             let steps = corners.map(|p| steps.get(p).copied().unwrap_or_default());
             if placed.normal == DVec3::ZERO {
@@ -796,11 +820,22 @@ impl ContactDetector {
             placed.is_marked = corners.iter().any(|&p| due.get(p) == Some(&Due::Moved));
         };
         if count < 2 * PARALLEL {
-            let slots = boxes.iter_mut().zip(placed).enumerate();
+            let slots = boxes.iter_mut().zip(&mut *placed).enumerate();
             slots.for_each(prepare);
         } else {
-            let slots = boxes.par_iter_mut().zip(placed).enumerate();
+            let slots = boxes.par_iter_mut().zip(&mut *placed).enumerate();
             slots.with_min_len(PARALLEL).for_each(prepare);
+        }
+        inversions.clear();
+        inversions.resize(state.positions.len(), Inversion::None);
+        for &vertex in &self.inverted {
+            inversions[vertex as usize] = Inversion::Recent;
+        }
+        let inverted = (0..).zip(placed).filter(|(_, placed)| placed.is_inverted);
+        for (slot, _) in inverted {
+            for p in state.mesh.mesh().tets[self.surface.triangle(slot).tet.index()] {
+                inversions[p.index()] = Inversion::Present;
+            }
         }
     }
 
@@ -912,6 +947,7 @@ impl ContactDetector {
         }
         let Room {
             placed,
+            inversions,
             found,
             parts,
             steps,
@@ -926,6 +962,7 @@ impl ContactDetector {
                 surface: &self.surface,
                 positions: state.positions,
                 placed,
+                inversions,
             },
             trees: [&self.main, &self.fresh],
             pairs: &self.fresh_pairs,
@@ -1008,6 +1045,7 @@ impl ContactDetector {
             last_candidates,
             last_sightings,
             last_deep,
+            last_inverted,
             place,
             ..
         } = &mut self.room;
@@ -1019,6 +1057,8 @@ impl ContactDetector {
         self.sightings.clear();
         std::mem::swap(&mut self.deep, last_deep);
         self.deep.clear();
+        std::mem::swap(&mut self.inverted, last_inverted);
+        self.inverted.clear();
         let (mut candidates, mut sightings) = (&last_candidates[..], &last_sightings[..]);
         let mut inside = &last_inside[..];
         for (&vertex, &place) in self.vertices.iter().zip(&*place) {
@@ -1034,6 +1074,8 @@ impl ContactDetector {
                     .extend(inside.first().filter(|(p, _)| p.0 == vertex));
                 let was_deep = last_deep.binary_search_by_key(&ParticleId(vertex), |deep| deep.0);
                 self.deep.extend(was_deep.ok().map(|i| last_deep[i]));
+                let was_inverted = last_inverted.binary_search(&vertex).is_ok();
+                self.inverted.extend(was_inverted.then_some(vertex));
             } else {
                 self.searched += usize::from(found.is_searched);
                 self.face_candidates.extend_from_slice(found.contacts());
@@ -1047,6 +1089,9 @@ impl ContactDetector {
                     }));
                 if found.inside != NONE {
                     self.inside.push((ParticleId(vertex), TetId(found.inside)));
+                }
+                if found.is_inverted {
+                    self.inverted.push(vertex);
                 }
                 if found.is_deep {
                     self.deep.push((ParticleId(vertex), found.is_buried));
@@ -1113,6 +1158,13 @@ impl ContactDetector {
     #[must_use]
     pub fn buried(&self) -> usize {
         self.deep.iter().filter(|(_, is_buried)| *is_buried).count()
+    }
+
+    /// The vertices that touch nothing of their own piece, ascending: a tet at them is inverted, or was and they have not
+    /// come out of the piece since.
+    #[must_use]
+    pub fn inverted(&self) -> &[u32] {
+        &self.inverted
     }
 
     /// The mean edge of the surface at rest in m, as it was when the search tree was built over all triangles.
@@ -1240,12 +1292,19 @@ fn fit(
     motions.for_each(Motion::fit);
 }
 
+/// Whether a tet is inverted by more than rounding turns a sliver over.
+fn is_inverted([a, b, c, d]: [DVec3; 4], mean_edge: f64) -> bool {
+    let volume = (b - a).dot((c - a).cross(d - a));
+    volume < -INVERTED * mean_edge.powi(3)
+}
+
 /// The box of a triangle and the triangle at the present positions; the empty box and no normal if it must not be touched.
 /// The tet behind it has a box of its own, so that the search also says which tets may contain a vertex.
 fn prepared(
     surface: &ContactSurface,
     body_of: &[u32],
     state: &ContactState<'_>,
+    mean_edge: f64,
     slot: u32,
 ) -> (Box32, PlacedTriangle) {
     if !surface.is_alive(slot) {
@@ -1262,6 +1321,7 @@ fn prepared(
         ..PlacedTriangle::default()
     };
     let corners = state.mesh.mesh().tets[tet.index()].map(|p| state.positions[p.index()]);
+    placed.is_inverted = is_inverted(corners, mean_edge);
     let squared = placed.area.length_squared();
     if !Barycentric::exist(corners) || surface.is_collapsed(slot, squared) {
         return (Box32::EMPTY, placed);

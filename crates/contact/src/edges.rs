@@ -418,7 +418,7 @@ fn contact(
         return None;
     }
     let tets = [edge, other].map(|edge| query.shape.triangle(edge.slots[0]).tet);
-    if !query.may_touch_each_other(tets) {
+    if !query.may_edges_touch(tets, [edge.ends, other.ends]) {
         return None;
     }
     let [p, q] = closest_on_segments(one.ends, two.ends);

@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 use incise_cutting::BoundaryTriangle;
-use incise_mesh::TrianglePart;
+use incise_mesh::{ParticleId, TrianglePart};
 
 use crate::surface::ContactSurface;
 use crate::tree::Box32;
@@ -33,6 +33,8 @@ pub(crate) struct PlacedTriangle {
     pub(crate) tet: Box32,
     /// The box around the ways that its corners go in the frame.
     pub(crate) steps: Box32,
+    /// Whether the tet behind it is inverted by more than rounding.
+    pub(crate) is_inverted: bool,
     /// Whether a corner has moved out of its reserve.
     pub(crate) is_marked: bool,
 }
@@ -44,6 +46,20 @@ pub(crate) struct Shape<'a> {
     pub(crate) positions: &'a [DVec3],
     /// By slot.
     pub(crate) placed: &'a [PlacedTriangle],
+    /// By particle.
+    pub(crate) inversions: &'a [Inversion],
+}
+
+/// Whether a vertex has been pushed through its own tets, so that it is on the wrong side of its own surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Inversion {
+    /// It has not.
+    #[default]
+    None,
+    /// At the last search it had, and may not be out of its own part yet.
+    Recent,
+    /// A tet at it is inverted.
+    Present,
 }
 
 impl<'a> Shape<'a> {
@@ -53,6 +69,10 @@ impl<'a> Shape<'a> {
 
     pub(crate) fn normal(&self, slot: u32) -> DVec3 {
         self.placed[slot as usize].normal
+    }
+
+    pub(crate) fn inversion(&self, vertex: ParticleId) -> Inversion {
+        self.inversions[vertex.index()]
     }
 
     pub(crate) fn is_sound(&self, slot: u32) -> bool {
@@ -145,6 +165,7 @@ mod tests {
             surface: &surface,
             positions,
             placed: &placed,
+            inversions: &[],
         };
         let particle = |x: DVec3| ParticleId::new(positions.iter().position(|p| *p == x).unwrap());
         let top = particle(DVec3::ONE);

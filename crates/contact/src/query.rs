@@ -16,6 +16,11 @@
 //! A vertex inside a tet of a body that no such triangle explains is deep: from that tet the neighbors are searched for a
 //! way out, nearest first, up to 64 tets. If there is none, the vertex is buried.
 //!
+//! A vertex of an inverted tet is on the wrong side of its own surface, where contact with its own part would hold it: so
+//! it touches nothing of that part until elasticity has brought it back and no tet of the part contains it. While the tet
+//! is inverted, the triangles and feature edges at its corners touch nothing of their own part either. Other parts they
+//! all still touch.
+//!
 //! Sources: J. A. Bærentzen and H. Aanæs 2005 (sides); H. Chen, E. Diaz, C. Yuksel 2023 (valid ways). Cost: a search in
 //! the tree, and for each triangle found a few dozen operations.
 
@@ -26,7 +31,7 @@ use incise_mesh::{Bounds, ClosestPoint, ParticleId, TetId, TrianglePart, closest
 use crate::ahead::{Lookout, Reach, approach};
 use crate::face::{FaceContact, Meeting, face_contact};
 use crate::index::NONE;
-use crate::normals::{Owner, Shape};
+use crate::normals::{Inversion, Owner, Shape};
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
@@ -71,6 +76,8 @@ pub(crate) struct Found {
     pub(crate) is_deep: bool,
     /// True if the vertex is deep and no way out was found.
     pub(crate) is_buried: bool,
+    /// Whether it touches nothing of its own part, because a tet at it is or was inverted.
+    pub(crate) is_inverted: bool,
 }
 
 impl Found {
@@ -86,6 +93,7 @@ impl Found {
         inside: NONE,
         is_deep: false,
         is_buried: false,
+        is_inverted: false,
     };
 
     pub(crate) fn clear(&mut self) {
@@ -95,6 +103,7 @@ impl Found {
         self.inside = NONE;
         self.is_deep = false;
         self.is_buried = false;
+        self.is_inverted = false;
     }
 
     pub(crate) fn contacts(&self) -> &[FaceContact] {
@@ -274,6 +283,8 @@ struct Vertex<'q> {
     behind: DVec3,
     body: u32,
     piece: u32,
+    /// Whether it may touch its own part.
+    touches_own: bool,
     normals: &'q VertexNormals,
 }
 
@@ -312,6 +323,8 @@ impl Query<'_> {
             behind: x - normals.mean() * (BEHIND * self.mean_edge),
             body: self.body_of[id.index()],
             piece: self.state.pieces.piece_of(self.shape.triangle(first).tet),
+            touches_own: self.settings.self_contact
+                && self.shape.inversion(id) != Inversion::Present,
             normals,
         })
     }
@@ -321,21 +334,37 @@ impl Query<'_> {
         found.clear();
         found.is_searched = true;
         let normals = VertexNormals::new(&self.shape, id);
-        let Some(vertex) = self.vertex_of(id, &normals) else {
+        let Some(mut vertex) = self.vertex_of(id, &normals) else {
             return;
         };
+        let inversion = self.shape.inversion(id);
+        self.contacts(&vertex, was_inside, found);
+        let is_inside_own =
+            found.inside != NONE && self.is_of_own_part(TetId(found.inside), &vertex);
+        if inversion == Inversion::Recent && is_inside_own {
+            found.clear();
+            vertex.touches_own = false;
+            self.contacts(&vertex, None, found);
+        }
+        found.is_searched = true;
+        found.is_inverted =
+            inversion == Inversion::Present || inversion == Inversion::Recent && is_inside_own;
+    }
+
+    /// Appends what a vertex may touch.
+    fn contacts(&self, vertex: &Vertex<'_>, was_inside: Option<TetId>, found: &mut Found) {
         let x = vertex.x;
         let mut outside = Nearest::<OUTSIDE>::EMPTY;
         let mut inside = Nearest::<TRIES>::EMPTY;
         let mut containing = NONE;
-        let lookout = self.lookout(&vertex);
-        self.each_beside(&vertex, &lookout, |leaf, beside| {
-            if !self.may_touch(&vertex, leaf.number) {
+        let lookout = self.lookout(vertex);
+        self.each_beside(vertex, &lookout, |leaf, beside| {
+            if !self.may_touch(vertex, leaf.number) {
                 return true;
             }
             if beside.may_contain {
                 let tet = self.shape.triangle(leaf.number).tet;
-                if self.is_inside(tet, &vertex) {
+                if self.is_inside(tet, vertex) {
                     containing = containing.min(tet.0);
                 }
             }
@@ -343,34 +372,34 @@ impl Query<'_> {
                 return true;
             }
             let most = f64::from(lookout.reach(&leaf.steps));
-            if let Some(near) = self.near(&vertex, leaf.number, most) {
+            if let Some(near) = self.near(vertex, leaf.number, most) {
                 if !near.is_inside {
                     outside.insert(near);
-                } else if !self.is_as_at_rest(&vertex, near.slot, near.distance) {
+                } else if !self.is_as_at_rest(vertex, near.slot, near.distance) {
                     inside.insert(near);
                 }
             }
             true
         });
         for near in outside.iter() {
-            found.push(self.contact(&vertex, near));
+            found.push(self.contact(vertex, near));
         }
         let mut ways = inside.iter();
-        let nearest = ways.find_map(|near| Some((near, self.way(near, &vertex, x)?)));
+        let nearest = ways.find_map(|near| Some((near, self.way(near, vertex, x)?)));
         let shallow = nearest.filter(|(near, _)| self.is_shallow(near, x));
         if let Some((near, tet)) = shallow {
-            found.push(self.contact(&vertex, near));
+            found.push(self.contact(vertex, near));
             found.inside = tet.0;
             return;
         }
-        if let Some(tet) = was_inside.and_then(|tet| self.followed(tet, &vertex)) {
+        if let Some(tet) = was_inside.and_then(|tet| self.followed(tet, vertex)) {
             containing = tet.0;
         }
-        if containing != NONE && !self.is_held_by_pair(&vertex, TetId(containing)) {
+        if containing != NONE && !self.is_held_by_pair(vertex, TetId(containing)) {
             found.inside = containing;
             found.is_deep = true;
-            match self.way_out(TetId(containing), &vertex) {
-                Some(near) => found.push(self.contact(&vertex, &near)),
+            match self.way_out(TetId(containing), vertex) {
+                Some(near) => found.push(self.contact(vertex, &near)),
                 None => found.is_buried = true,
             }
         }
@@ -466,36 +495,54 @@ impl Query<'_> {
 
     /// Whether the vertex may touch a triangle: it is no corner of it and their bodies may touch.
     fn may_touch(&self, vertex: &Vertex<'_>, slot: u32) -> bool {
-        self.may_touch_owner(vertex, self.shape.owner(slot))
-            && !self.shape.triangle(slot).particles.contains(&vertex.id)
+        let owner = self.shape.owner(slot);
+        let corners = &self.shape.triangle(slot).particles;
+        // A corner that is on the wrong side of its own surface takes the triangle with it.
+        let is_right = |corner: &ParticleId| self.shape.inversion(*corner) != Inversion::Present;
+        self.may_touch_owner(vertex, owner)
+            && !corners.contains(&vertex.id)
+            && (!Self::is_own_part(vertex, owner) || corners.iter().all(is_right))
+    }
+
+    fn is_own_part(vertex: &Vertex<'_>, owner: Owner) -> bool {
+        owner.body == vertex.body && owner.piece == vertex.piece
     }
 
     fn may_touch_owner(&self, vertex: &Vertex<'_>, owner: Owner) -> bool {
-        if owner.body == vertex.body {
-            self.settings.self_contact || owner.piece != vertex.piece
+        if Self::is_own_part(vertex, owner) {
+            vertex.touches_own
+        } else if owner.body == vertex.body {
+            true
         } else {
             self.settings.bodies.allow(owner.body, vertex.body)
         }
     }
 
     fn may_touch_part(&self, vertex: &Vertex<'_>, tet: TetId) -> bool {
-        let [first, ..] = self.state.mesh.mesh().tets[tet.index()];
-        let owner = Owner {
-            body: self.body_of[first.index()],
-            piece: self.state.pieces.piece_of(tet),
-        };
-        self.may_touch_owner(vertex, owner)
+        self.may_touch_owner(vertex, self.owner_of(tet))
     }
 
-    /// Whether the parts of two tets may touch.
-    pub(crate) fn may_touch_each_other(&self, tets: [TetId; 2]) -> bool {
-        let corners = |tet: TetId| self.state.mesh.mesh().tets[tet.index()];
-        let [one, other] = tets.map(|tet| self.body_of[corners(tet)[0].index()]);
-        if one == other {
-            let [one, other] = tets.map(|tet| self.state.pieces.piece_of(tet));
-            self.settings.self_contact || one != other
+    fn owner_of(&self, tet: TetId) -> Owner {
+        let [first, ..] = self.state.mesh.mesh().tets[tet.index()];
+        Owner {
+            body: self.body_of[first.index()],
+            piece: self.state.pieces.piece_of(tet),
+        }
+    }
+
+    fn is_of_own_part(&self, tet: TetId, vertex: &Vertex<'_>) -> bool {
+        Self::is_own_part(vertex, self.owner_of(tet))
+    }
+
+    /// Whether two edges may touch by the parts of their tets, and by their ends within one part.
+    pub(crate) fn may_edges_touch(&self, tets: [TetId; 2], ends: [[u32; 2]; 2]) -> bool {
+        let [one, other] = tets.map(|tet| self.owner_of(tet));
+        let is_right = |end: &u32| self.shape.inversion(ParticleId(*end)) != Inversion::Present;
+        if one.body != other.body {
+            self.settings.bodies.allow(one.body, other.body)
         } else {
-            self.settings.bodies.allow(one, other)
+            one.piece != other.piece
+                || self.settings.self_contact && ends.as_flattened().iter().all(is_right)
         }
     }
 

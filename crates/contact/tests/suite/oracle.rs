@@ -36,6 +36,8 @@ struct Slow<'a> {
     /// By particle the places of its triangles.
     fans: Vec<Vec<usize>>,
     partners: BTreeMap<u32, BTreeSet<u32>>,
+    /// Corners of inverted tets with a triangle.
+    inverted: BTreeSet<u32>,
 }
 
 /// All candidates of edges at the present positions: each feature edge against each other one, and of these the four
@@ -87,7 +89,15 @@ fn slow(scene: &Scene) -> Slow<'_> {
         normals: Vec::new(),
         fans: vec![Vec::new(); scene.positions.len()],
         partners,
+        inverted: BTreeSet::new(),
     };
+    let least = -1e-3 * scene.contacts.mean_edge().powi(3);
+    for triangle in scene.body.boundary() {
+        if 6.0 * signed_volume(slow.tet(triangle.tet)) < least {
+            let corners = scene.body.mesh().tets[triangle.tet.index()];
+            slow.inverted.extend(corners.map(|p| p.0));
+        }
+    }
     slow.triangles = scene.body.boundary().filter(|t| slow.is_sound(t)).collect();
     slow.triangles.sort_by_key(|t| (t.tet, t.opposite));
     slow.normals = slow
@@ -128,6 +138,13 @@ impl Slow<'_> {
         let [a, b, c] = rest;
         let at_rest = (b - a).cross(c - a).length();
         self.area(triangle).length() > 1e-3 * at_rest && signed_volume(self.tet(triangle.tet)) > 0.0
+    }
+
+    /// Whether both are of one part that does not touch itself there, because of an inverted tet at one of these particles.
+    fn is_held_off(&self, own: TetId, tet: TetId, particles: &[u32]) -> bool {
+        let pieces = &self.scene.pieces;
+        let is_inverted = particles.iter().any(|p| self.inverted.contains(p));
+        is_inverted && pieces.piece_of(own) == pieces.piece_of(tet)
     }
 
     fn may_touch(&self, vertex: u32, own: TetId, tet: TetId) -> bool {
@@ -207,9 +224,19 @@ impl Slow<'_> {
             dots.fold(f64::INFINITY, f64::min)
         };
         let own = fan.iter().min_by_key(|t| (t.tet, t.opposite)).unwrap().tet;
+        // One that was inverted and has not come out since is held off, too.
+        let was_inverted = self.scene.contacts.inverted().contains(&vertex);
+        let is_held_off = |tet: TetId| {
+            let pieces = &self.scene.pieces;
+            self.is_held_off(own, tet, &[vertex])
+                || was_inverted && pieces.piece_of(own) == pieces.piece_of(tet)
+        };
         let eligible = |triangle: &BoundaryTriangle| {
+            let corners = triangle.particles.map(|p| p.0);
             !triangle.particles.contains(&ParticleId(vertex))
                 && self.may_touch(vertex, own, triangle.tet)
+                && !self.is_held_off(own, triangle.tet, &corners)
+                && !is_held_off(triangle.tet)
         };
         let (mut outside, mut inside) = (Vec::new(), Vec::new());
         for (i, triangle) in self.triangles.iter().enumerate() {
@@ -321,7 +348,10 @@ impl Slow<'_> {
                 let coordinates = barycentric(self.tet(tet), x);
                 coordinates.into_iter().all(|b| b > -1e-2)
             };
-            self.may_touch(vertex, own, tet) && signed_volume(self.tet(tet)) > 0.0 && inside()
+            self.may_touch(vertex, own, tet)
+                && !is_held_off(tet)
+                && signed_volume(self.tet(tet)) > 0.0
+                && inside()
         };
         if others.any(contains) {
             expected.deep.insert(vertex);
@@ -393,6 +423,7 @@ impl Slow<'_> {
                     |p: &u32| others.contains(p) || held(p).iter().any(|q| others.contains(q));
                 if ends.iter().any(meets)
                     || !self.may_touch(ends[0], tets[0].tet, other_tets[0].tet)
+                    || self.is_held_off(tets[0].tet, other_tets[0].tet, &[*ends, *others].concat())
                 {
                     continue;
                 }

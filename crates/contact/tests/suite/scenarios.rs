@@ -48,34 +48,39 @@ fn a_thin_wall_does_not_touch_itself() {
     assert_eq!(scene.contacts.deep(), 0);
 }
 
+/// A plate of 1.6 by 0.4 by 0.02 m: two flat halves, the second turned over, joined by half a turn around the fold, with
+/// a gap or an overlap between them.
+fn fold(scene: &mut Scene, gap: f64) {
+    let radius = 0.15;
+    let fold = std::f64::consts::PI * radius;
+    let straight = 0.5 * (1.6 - fold);
+    for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
+        let s = rest.x - straight;
+        *x = if s <= 0.0 {
+            DVec3::new(s, rest.y, rest.z)
+        } else if s < fold {
+            let angle = s / radius;
+            let r = radius - rest.z;
+            DVec3::new(r * angle.sin(), rest.y, radius - r * angle.cos())
+        } else {
+            DVec3::new(fold - s, rest.y, 2.0 * radius - rest.z)
+        };
+        // The upper half comes down.
+        if x.z > radius {
+            let share = (-x.x / (0.4 * straight)).clamp(0.0, 1.0);
+            let lowered = x.z - (2.0 * radius - 0.04 - gap);
+            x.z += (lowered - x.z) * share;
+        }
+    }
+}
+
 /// A plate folded onto itself: what touches are the two inner faces, and nothing through a wall.
 #[test]
 fn a_folded_plate() {
     let plate = kuhn_box([16, 4, 1], DVec3::new(1.6, 0.4, 0.02));
     let mut scene = Scene::new(&[plate], ContactSettings::default());
     for gap in [0.01, 0.0, -0.004] {
-        // Two flat halves, the second turned over, joined by half a turn around the fold.
-        let radius = 0.15;
-        let fold = std::f64::consts::PI * radius;
-        let straight = 0.5 * (1.6 - fold);
-        for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
-            let s = rest.x - straight;
-            *x = if s <= 0.0 {
-                DVec3::new(s, rest.y, rest.z)
-            } else if s < fold {
-                let angle = s / radius;
-                let r = radius - rest.z;
-                DVec3::new(r * angle.sin(), rest.y, radius - r * angle.cos())
-            } else {
-                DVec3::new(fold - s, rest.y, 2.0 * radius - rest.z)
-            };
-            // The upper half comes down.
-            if x.z > radius {
-                let share = (-x.x / (0.4 * straight)).clamp(0.0, 1.0);
-                let lowered = x.z - (2.0 * radius - 0.04 - gap);
-                x.z += (lowered - x.z) * share;
-            }
-        }
+        fold(&mut scene, gap);
         scene.search();
         compare(&scene);
         let rest = &scene.body.mesh().positions;
@@ -100,6 +105,77 @@ fn a_folded_plate() {
         }
         assert_eq!(scene.contacts.buried(), 0);
     }
+}
+
+/// A vertex that was pushed through its own tet is on the wrong side of its surface, where contact with its own part would
+/// hold it. It touches nothing of that part until it is back and out of it, but other parts all the time.
+#[test]
+fn a_vertex_of_an_inverted_tet() {
+    let plate = kuhn_box([16, 4, 1], DVec3::new(1.6, 0.4, 0.02));
+    let block = moved(kuhn_box([2; 3], DVec3::splat(0.2)), DVec3::splat(5.0));
+    let mut scene = Scene::new(&[plate, block], ContactSettings::default());
+    let of_plate = 17 * 5 * 2;
+    let block: Vec<DVec3> = scene.positions[of_plate..].to_vec();
+    let touched = |scene: &Scene, vertex: u32| -> Vec<FaceContact> {
+        let of_vertex = |contact: &&FaceContact| contact.particles.contains(&vertex);
+        let faces = scene.contacts.face_candidates().iter();
+        faces.filter(of_vertex).copied().collect()
+    };
+    let place = |scene: &mut Scene, gap: f64| {
+        fold(scene, gap);
+        scene.positions[of_plate..].copy_from_slice(&block);
+    };
+    place(&mut scene, -0.004);
+    scene.search();
+    compare(&scene);
+    assert!(scene.contacts.inverted().is_empty());
+    let rest = &scene.body.mesh().positions;
+    let is_upper_inner = |p: &u32| {
+        let x = rest[*p as usize];
+        x.distance(DVec3::new(1.4, 0.2, 0.02)) < 1e-9
+    };
+    let vertex = (0..u32::try_from(of_plate).unwrap()).find(is_upper_inner);
+    let vertex = vertex.unwrap();
+    assert!(
+        !touched(&scene, vertex).is_empty(),
+        "it touches the lower half"
+    );
+
+    // Up through its own half, which is 0.02 m thick.
+    scene.positions[vertex as usize].z += 0.1;
+    scene.search();
+    compare(&scene);
+    assert!(scene.contacts.inverted().contains(&vertex));
+    assert!(touched(&scene, vertex).is_empty());
+    // A block there is touched by it.
+    let shift = scene.positions[vertex as usize] - block[0] - DVec3::new(0.1, 0.1, 0.199);
+    for (x, start) in scene.positions[of_plate..].iter_mut().zip(&block) {
+        *x = *start + shift;
+    }
+    scene.search();
+    compare(&scene);
+    let with_block = touched(&scene, vertex);
+    assert!(!with_block.is_empty());
+    for contact in with_block {
+        let [one, other, ..] = contact.particles.map(|p| p as usize);
+        assert!(one.max(other) >= of_plate, "{contact:?}");
+    }
+
+    // Back, but still within the lower half; then out of it.
+    for (gap, is_held_off) in [(-0.004, true), (0.001, false)] {
+        place(&mut scene, gap);
+        scene.search();
+        assert_eq!(scene.contacts.inverted().contains(&vertex), is_held_off);
+        let contacts = touched(&scene, vertex);
+        let own = contacts.iter().filter(|c| c.particles[0] == vertex);
+        assert_eq!(own.count() == 0, is_held_off, "gap {gap}");
+    }
+    // Without that past it touches the lower half again.
+    place(&mut scene, -0.004);
+    scene.search();
+    compare(&scene);
+    assert!(scene.contacts.inverted().is_empty());
+    assert!(!touched(&scene, vertex).is_empty());
 }
 
 /// A block pressed into another one, by up to nearly a layer of tets, leaves by the face it came in by.
