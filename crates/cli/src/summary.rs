@@ -105,10 +105,12 @@ impl Summary {
             "clusters, colors".to_owned(),
             format!("{}, {}", self.last.clusters, self.last.colors),
         ]);
-        counts.add_row([
-            "smallest child of a cut (part of its tet's volume)".to_owned(),
-            format!("{:.2e}", self.worst_volume_ratio),
-        ]);
+        if self.worst_volume_ratio < 1.0 {
+            counts.add_row([
+                "smallest child of a cut (part of its tet's volume)".to_owned(),
+                format!("{:.2e}", self.worst_volume_ratio),
+            ]);
+        }
         for body in &self.last.bodies {
             counts.add_row([substeps_of(&body.bodies), substeps(body)]);
         }

@@ -1023,6 +1023,7 @@ impl ContactDetector {
                 !asked.all && due[vertex.index()] == Due::Nothing && !is_near_moved_part();
             if !found.is_kept {
                 query.vertex(vertex, was_inside.ok().map(|i| inside[i].1), found);
+                found.is_searched = true;
             }
         };
         found.resize(vertices.len(), Found::NOTHING);

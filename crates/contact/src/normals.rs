@@ -51,7 +51,7 @@ pub(crate) struct Shape<'a> {
 }
 
 /// Whether a vertex has been pushed through its own tets, so that it is on the wrong side of its own surface.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Inversion {
     /// It has not.
     #[default]

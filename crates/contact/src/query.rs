@@ -329,26 +329,28 @@ impl Query<'_> {
         })
     }
 
-    /// Writes what `id` may touch. `was_inside` is the tet of another part that contained it at the last search.
+    /// Writes what `id` may touch in place of what `found` says. `was_inside` is the tet of another part that contained it at the last search.
     pub(crate) fn vertex(&self, id: ParticleId, was_inside: Option<TetId>, found: &mut Found) {
         found.clear();
-        found.is_searched = true;
         let normals = VertexNormals::new(&self.shape, id);
         let Some(mut vertex) = self.vertex_of(id, &normals) else {
             return;
         };
-        let inversion = self.shape.inversion(id);
         self.contacts(&vertex, was_inside, found);
-        let is_inside_own =
-            found.inside != NONE && self.is_of_own_part(TetId(found.inside), &vertex);
-        if inversion == Inversion::Recent && is_inside_own {
+        found.is_inverted = match self.shape.inversion(id) {
+            Inversion::None => false,
+            Inversion::Recent => {
+                found.inside != NONE && self.is_of_own_part(TetId(found.inside), &vertex)
+            }
+            Inversion::Present => true,
+        };
+        if found.is_inverted && vertex.touches_own {
+            // Back, but not out of its part.
             found.clear();
             vertex.touches_own = false;
             self.contacts(&vertex, None, found);
+            found.is_inverted = true;
         }
-        found.is_searched = true;
-        found.is_inverted =
-            inversion == Inversion::Present || inversion == Inversion::Recent && is_inside_own;
     }
 
     /// Appends what a vertex may touch.
