@@ -26,6 +26,7 @@ fn a_run_prints_a_table_and_writes_its_files() {
         "ms per frame",
         "solve",
         "4 (1 with a cut)",
+        "smallest child of a cut",
         "tets at start, end",
         "pieces",
         "kappa",
@@ -53,11 +54,12 @@ fn a_run_prints_a_table_and_writes_its_files() {
 }
 
 #[test]
-fn the_table_has_a_row_of_contact_only_where_contact_is_declared() {
+fn the_table_has_rows_of_contact_and_cuts_only_where_there_are_any() {
     let sandbox = Sandbox::with_scene();
     sandbox.write("touching.toml", format!("{SCENE}\n[contact]\n"));
     for (scene, declared) in [("scene.toml", false), ("touching.toml", true)] {
         let table = sandbox.good(&["run", scene, "--frames", "1", "--no-pictures"]);
+        assert!(!table.contains("of a cut"), "nothing was cut yet:\n{table}");
         assert_eq!(table.contains("contact"), declared, "{table}");
     }
 }
