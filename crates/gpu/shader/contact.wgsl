@@ -211,7 +211,10 @@ fn face_gap(contact: Contact) -> Gap {
             let other = gap_to(beyond, above(now, beyond, thickness), other_before);
             let slight = SLIGHT * dot(now.e1, now.e1);
             var acts = other_before > before;
-            if other.value >= 0.0 || (is_slight(before, slight) && is_slight(other_before, slight)) {
+            // Outside of one plane is outside: that one lets go of what it pressed.
+            if other.value >= 0.0 {
+                acts = true;
+            } else if is_slight(before, slight) && is_slight(other_before, slight) {
                 acts = other.residual > gap.residual;
             }
             if acts {

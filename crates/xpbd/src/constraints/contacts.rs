@@ -557,7 +557,10 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
             let [edge, ..] = now;
             let slight = R::from_f64(SLIGHT) * R::dot(edge, edge);
             let is_slight = |before: R| before >= R::ZERO || before * before < slight;
-            let acts = if other.value >= R::ZERO || is_slight(before) && is_slight(other_before) {
+            // Outside of one plane is outside: that one lets go of what it pressed.
+            let acts = if other.value >= R::ZERO {
+                true
+            } else if is_slight(before) && is_slight(other_before) {
                 other.residual > gap.residual
             } else {
                 other_before > before
