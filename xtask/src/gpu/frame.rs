@@ -21,10 +21,12 @@ use crate::experiment::median;
 use crate::models::Model;
 
 /// Compute devices and clusterings of a scene.
-const PLACES: [(&str, bool, &str); 3] = [
+const PLACES: [(&str, bool, &str); 5] = [
     ("device, serial:10", true, "serial:10"),
+    ("device, pressure:10", true, "pressure:10"),
     ("device, pressure:128", true, "pressure:128"),
     ("host, serial:10", false, "serial:10"),
+    ("host, pressure:10", false, "pressure:10"),
 ];
 
 const SUBSTEPS: u32 = 20;

@@ -31,15 +31,16 @@ pub(crate) struct Way {
     jacobi: Option<f64>,
 }
 
-pub(crate) const WAYS: [Way; 6] = [
-    Way::threads("thread, no clusters", "none"),
-    Way::threads("cluster form, serial:10", "serial:10"),
-    Way::workgroups("block form, pressure:64", "pressure:64"),
-    Way::workgroups("block form, pressure:128", "pressure:128"),
-    Way::workgroups("block form, pressure:256", "pressure:256"),
+pub(crate) const WAYS: [Way; 7] = [
+    Way::threads("threads, none", "none"),
+    Way::threads("threads, serial:10", "serial:10"),
+    Way::threads("threads, pressure:10", "pressure:10"),
+    Way::workgroups("workgroups, pressure:64", "pressure:64"),
+    Way::workgroups("workgroups, pressure:128", "pressure:128"),
+    Way::workgroups("workgroups, pressure:256", "pressure:256"),
     Way {
         jacobi: Some(0.1),
-        ..Way::threads("Jacobi 0.1, serial:10", "serial:10")
+        ..Way::threads("threads, Jacobi 0.1", "serial:10")
     },
 ];
 

@@ -39,7 +39,7 @@ pub(crate) struct GpuArguments {
     /// Only these tables, beside the bandwidth.
     #[arg(long, value_enum, value_delimiter = ',')]
     only: Vec<Part>,
-    /// The most tets of a body; else as many as fit, or 25,000 on a software adapter.
+    /// The most tets of a body; else 5 million or as many as fit, or 25,000 on a software adapter.
     #[arg(long, value_name = "N")]
     largest: Option<usize>,
     /// Do not run the workspace's tests, but the checks that are built in.
@@ -85,8 +85,9 @@ const GROWTH: usize = 4;
 /// Bytes of a tet's rest shape: the largest array, which limits the size of a body.
 const REST_BYTES: u64 = 64;
 
-/// Default limit of tets on a software adapter.
+/// Default limits of tets, on a software adapter and on others: beyond them the host takes minutes for a body.
 const SOFTWARE_LARGEST: usize = 25_000;
+const LARGEST: usize = 5_000_000;
 
 #[expect(clippy::print_stdout, reason = "the page is the result of the command")]
 pub(crate) fn sweep(arguments: &GpuArguments) -> anyhow::Result<()> {
@@ -99,8 +100,12 @@ pub(crate) fn sweep(arguments: &GpuArguments) -> anyhow::Result<()> {
         Err(error) => return Err(error).context("a GPU is needed (Mesa's lavapipe will do)"),
     };
     let report = report(&gpu, arguments)?;
-    let page = page::page(&report)?;
-    println!("{page}");
+    println!("{}", page::page(&report)?);
+    save(&report, arguments)
+}
+
+/// Writes page and JSON.
+fn save(report: &Report, arguments: &GpuArguments) -> anyhow::Result<()> {
     let name = format!("gpu-{}", file_name(&report.facts.adapter));
     let path = |given: &Option<PathBuf>, ending: &str| match given {
         Some(path) => path.clone(),
@@ -108,8 +113,8 @@ pub(crate) fn sweep(arguments: &GpuArguments) -> anyhow::Result<()> {
     };
     std::fs::create_dir_all(&arguments.out_dir)
         .with_context(|| arguments.out_dir.display().to_string())?;
-    write(&path(&arguments.out, "md"), &page)?;
-    let json = serde_json::to_string_pretty(&report)?;
+    write(&path(&arguments.out, "md"), &page::page(report)?)?;
+    let json = serde_json::to_string_pretty(report)?;
     write(&path(&arguments.json, "json"), &format!("{json}\n"))
 }
 
@@ -156,7 +161,7 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
             ));
             SOFTWARE_LARGEST
         }
-        None => usize::MAX,
+        None => LARGEST,
     };
     let mut models = models(arguments.models.as_deref(), largest, arguments.quick)?;
     models.retain(|model| model.mesh.tets.len() <= largest);
@@ -165,6 +170,8 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
         let residuals = i == 0 || i + 1 == models.len();
         sweep.passes(model, residuals, &mut report)?;
         sweep.frames(model, &mut report)?;
+        // What is cut off later leaves what was measured so far.
+        save(&report, arguments)?;
     }
     if sweep.wants(Part::Memory) {
         let sizes: &[usize] = if arguments.quick { &[1500] } else { &MEMORY };
@@ -172,6 +179,7 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
             say(&format!("memory of {tets} tets"));
             report.memory.extend(memory::memory(gpu, tets)?);
         }
+        save(&report, arguments)?;
     }
     let measured: Vec<usize> = models.iter().map(|model| model.mesh.tets.len()).collect();
     drop(models);
@@ -182,6 +190,7 @@ fn report(gpu: &Arc<GpuContext>, arguments: &GpuArguments) -> anyhow::Result<Rep
         let model = Model::generated(Shape::Liver, tets)?;
         sweep.passes(&model, false, &mut report)?;
         sweep.frames(&model, &mut report)?;
+        save(&report, arguments)?;
     }
     Ok(report)
 }

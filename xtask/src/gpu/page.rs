@@ -24,7 +24,7 @@ pub(crate) fn page(report: &Report) -> anyhow::Result<String> {
         iterations(report),
     )?;
     section(
-        "Block form against the paper's cluster form",
+        "Workgroups and threads",
         "One step of 1/60 s from rest under gravity, a body 1 m long held at one end, E = 1e5 Pa, Poisson's ratio 0.45. \
          *dual* is the root mean square of what the constraints are off, *force* what is left of the equations of \
          motion over the weight, which no number of iterations brings to 0 since XPBD drops a part of them.",
@@ -162,7 +162,7 @@ mod tests {
         assert!(text.contains("- Memory of 1000 tets, workgroups: too large."));
         assert!(text.contains("- ball, none, vivace: the device has no room for it."));
         assert_eq!(
-            row(&text, "Block form", "ball, 1000 tets 12.0")[7],
+            row(&text, "Workgroups and threads", "ball, 1000 tets 12.0")[7],
             "1.00e-1"
         );
         assert_eq!(row(&text, "Device memory", "1000 300 threads")[4], "1.0");

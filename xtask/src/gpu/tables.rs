@@ -13,7 +13,7 @@ pub(super) fn iterations(report: &Report) -> Table {
     let mut table = table([
         "mesh",
         "tets",
-        "form",
+        "mapping",
         "clusters",
         "colors",
         "dispatches",
@@ -58,7 +58,7 @@ pub(super) fn iterations(report: &Report) -> Table {
 }
 
 pub(super) fn compared(report: &Report) -> Table {
-    let mut header: Vec<String> = ["mesh", "kappa", "form", "colors", "dispatches", "ms"]
+    let mut header: Vec<String> = ["mesh", "kappa", "mapping", "colors", "dispatches", "ms"]
         .map(str::to_owned)
         .to_vec();
     for what in ["dual", "force"] {
@@ -102,7 +102,7 @@ pub(super) fn memory(report: &Report) -> Table {
     let mut table = table([
         "tets",
         "particles",
-        "form",
+        "mapping",
         "MiB",
         "bytes a tet",
         "sent MiB",

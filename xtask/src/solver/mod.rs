@@ -39,6 +39,8 @@ enum Part {
     Rest,
     /// Nanoseconds a tet, on one thread and on two.
     Speed,
+    /// Nanoseconds a tet on 1, 2, 4 threads and on to the number of cores.
+    Threads,
 }
 
 #[expect(
@@ -68,6 +70,12 @@ fn tables(arguments: &SolverArguments) -> anyhow::Result<String> {
         let mesh = body::liver(arguments.models.as_deref(), arguments.quick)?;
         parts.push(speed::speed(
             &mesh,
+            arguments.models.as_deref(),
+            arguments.quick,
+        )?);
+    }
+    if wanted(Part::Threads) {
+        parts.push(speed::threads(
             arguments.models.as_deref(),
             arguments.quick,
         )?);

@@ -137,23 +137,47 @@ fn gently() -> StepSettings {
     }
 }
 
-/// Depths and forces, in m and N.
-fn compare(device: &[ContactState], host: &[ContactState], exact: bool) {
-    assert_eq!(device.len(), host.len());
-    let largest = host.iter().map(|c| c.force.length()).fold(1e-9, f64::max);
-    for (one, other) in device.iter().zip(host) {
-        assert_eq!((one.vertex, one.against), (other.vertex, other.against));
-        if exact {
-            assert_eq!(one, other);
-        } else {
-            // Rounding of positions in a body of size 1, and of impulses from them.
-            assert!((one.depth - other.depth).abs() < 1e-5);
-            assert!(one.force.distance(other.force) < 1e-2 * largest);
+/// How far hosts come to be apart from one whose particles start off by up to a unit in the last place of 1, as those of a
+/// device that rounds in its own way: contacts at random places have no plane, or two of equal depth, so that rounding
+/// decides which one acts.
+fn with_rounding(host: &Solver<f32>) -> impl Iterator<Item = Solver<f32>> {
+    (0..12).map(|number| {
+        let mut solver = host.clone();
+        for p in 0..solver.particle_count() {
+            let by = direction(7919 * number + p as u64) * 2.0 * f64::from(f32::EPSILON);
+            if !solver.is_fixed(p) {
+                solver.set_position(p, solver.position(p) + by);
+            }
         }
+        solver
+    })
+}
+
+/// By how much more than hosts a device may be off.
+const MARGIN: f64 = 4.0;
+
+/// Gives the particles of a solver the state of another one.
+fn take_state(solver: &mut Solver<f32>, from: &Solver<f32>) {
+    for p in 0..from.particle_count() {
+        solver.set_position(p, from.position(p));
+        solver.set_velocity(p, from.velocity(p));
     }
 }
 
-/// Steps both with contacts set in each frame; the same bits on lavapipe.
+/// How far states of contacts are apart at most: depth in m, force in N.
+fn apart(one: &[ContactState], other: &[ContactState]) -> [f64; 2] {
+    assert_eq!(one.len(), other.len());
+    let mut most = [0.0_f64; 2];
+    for (one, other) in one.iter().zip(other) {
+        assert_eq!((one.vertex, one.against), (other.vertex, other.against));
+        most[0] = most[0].max((one.depth - other.depth).abs());
+        most[1] = most[1].max(one.force.distance(other.force));
+    }
+    most
+}
+
+/// Steps both with contacts set in each frame: the same bits on lavapipe. Elsewhere both start each part of a frame from one
+/// state, and are no farther apart after it than rounding puts hosts.
 fn twins(test: &str, law: ContactLaw, settings: &StepSettings, parts: &[std::ops::Range<u32>]) {
     let Some(gpu) = gpu(test) else { return };
     let mesh = bar();
@@ -165,6 +189,11 @@ fn twins(test: &str, law: ContactLaw, settings: &StepSettings, parts: &[std::ops
         for frame in 0..6 {
             for part in parts {
                 let list = random(&mesh, 7000 * frame + u64::from(part.start), 60);
+                let exact = is_lavapipe(gpu);
+                if !exact {
+                    let Twins { device, host, .. } = &mut twins;
+                    take_state(device.edit().unwrap(), host);
+                }
                 twins.edit(|solver| list.set(solver, &law));
                 let Twins {
                     device,
@@ -172,6 +201,10 @@ fn twins(test: &str, law: ContactLaw, settings: &StepSettings, parts: &[std::ops
                     schedule,
                     order,
                 } = &mut twins;
+                let others: Vec<_> = match exact {
+                    true => Vec::new(),
+                    false => with_rounding(host).collect(),
+                };
                 device
                     .step_part(schedule, settings, part.clone(), false)
                     .unwrap();
@@ -180,8 +213,32 @@ fn twins(test: &str, law: ContactLaw, settings: &StepSettings, parts: &[std::ops
                 device.check(schedule).unwrap();
                 let there: Vec<_> = device.host().unwrap().contacts().collect();
                 let here: Vec<_> = host.contacts().collect();
-                let exact = is_lavapipe(gpu);
-                compare(&there, &here, exact);
+                if exact {
+                    assert_eq!(there, here);
+                } else {
+                    // A micrometer and a millionth of the largest force.
+                    let largest = here.iter().map(|c| c.force.length()).fold(0.0, f64::max);
+                    let mut allowed = [1e-6, 1e-6 * largest, 1e-6];
+                    for mut other in others {
+                        other
+                            .step_part(order, settings, part.clone(), false)
+                            .unwrap();
+                        let states: Vec<_> = other.contacts().collect();
+                        let [depth, force] = apart(&states, &here);
+                        let off = [depth, force, crate::solver::distance(&other, host)];
+                        allowed = [0, 1, 2].map(|k| f64::max(allowed[k], MARGIN * off[k]));
+                    }
+                    let [depth, force] = apart(&there, &here);
+                    let off = [
+                        depth,
+                        force,
+                        crate::solver::distance(device.cached_host(), host),
+                    ];
+                    assert!(
+                        (0..3).all(|k| off[k] <= allowed[k]),
+                        "{test}, {form:?}, {frame}: {off:?} of {allowed:?}"
+                    );
+                }
                 pressed += here.iter().filter(|c| c.pressure > 0.0).count();
                 if exact {
                     assert!(
@@ -192,9 +249,7 @@ fn twins(test: &str, law: ContactLaw, settings: &StepSettings, parts: &[std::ops
             }
             without.step(&order, settings).unwrap();
         }
-        // Six frames of rounding in another order.
-        let far = twins.apart();
-        assert!(far < 1e-4, "{test}, {form:?}: {far}");
+        assert_eq!(twins.device.repaired(), 0);
         assert!(pressed > 100, "{test}: {pressed} contacts pressed");
         let moved = crate::solver::distance(&twins.host, &without);
         assert!(moved > 1e-3, "{test}: the contacts did nothing");
@@ -271,28 +326,41 @@ fn dust(positions: &[DVec3], fixed: &[usize], list: &List) -> Solver<f32> {
     solver
 }
 
-/// The states of both after some frames.
-fn both(gpu: &'static GpuContext, make: impl Fn() -> Solver<f32>) -> [Solver<f32>; 2] {
+/// The states of both after some frames, and how far the device may be off.
+fn both(
+    gpu: &'static GpuContext,
+    make: impl Fn() -> Solver<f32>,
+) -> ([Solver<f32>; 2], Option<f64>) {
     let (schedule, settings) = (Schedule::default(), gently());
+    let run = |mut solver: Solver<f32>| {
+        for _ in 0..3 {
+            solver.step(&schedule, &settings).unwrap();
+        }
+        solver
+    };
     let mut device = GpuSolver::new(share(gpu), make(), ClusterMapping::Threads).unwrap();
-    let mut host = make();
     for _ in 0..3 {
         device.step(&schedule, &settings).unwrap();
-        host.step(&schedule, &settings).unwrap();
     }
     device.check(&schedule).unwrap();
-    [device.host().unwrap().clone(), host]
+    let host = run(make());
+    let start = make();
+    let allowed = (!is_lavapipe(gpu)).then(|| {
+        let off = with_rounding(&start).map(|other| crate::solver::distance(&run(other), &host));
+        off.map(|off| MARGIN * off).fold(1e-6, f64::max)
+    });
+    ([device.host().unwrap().clone(), host], allowed)
 }
 
-fn assert_equal(gpu: &GpuContext, [device, host]: &[Solver<f32>; 2]) {
-    if is_lavapipe(gpu) {
-        assert_eq!(state(device), state(host));
-    }
+fn assert_equal(([device, host], allowed): &([Solver<f32>; 2], Option<f64>)) {
     let far = crate::solver::distance(device, host);
-    // Three frames of rounding.
-    assert!(far < 1e-5, "{far}");
+    match allowed {
+        None => assert_eq!(state(device), state(host)),
+        Some(allowed) => assert!(far <= *allowed, "{far} of {allowed}"),
+    }
     let all = 0..host.particle_count();
     assert!(all.clone().all(|p| host.position(p).is_finite()));
+    assert!(all.clone().all(|p| device.position(p).is_finite()));
 }
 
 /// Triangles without area or of one point, a vertex on a corner, an edge without length with a second plane, coincident
@@ -340,7 +408,7 @@ fn degenerate_contacts() {
                         pairs: vec![pair],
                         surfaces: vec![surface],
                     };
-                    assert_equal(gpu, &both(gpu, || dust(&triangle, fixed, &list)));
+                    assert_equal(&both(gpu, || dust(&triangle, fixed, &list)));
                 }
             }
         }
@@ -370,7 +438,7 @@ fn tails_keep_the_order() {
         solver.set_contacts(&LAW, (&pairs, &all), none).unwrap();
         solver
     };
-    assert_equal(gpu, &both(gpu, make));
+    assert_equal(&both(gpu, make));
 }
 
 proptest! {
@@ -411,10 +479,7 @@ proptest! {
                 });
             }
         }
-        let [device, host] = both(gpu, || dust(&positions, &[2], &list));
-        if is_lavapipe(gpu) {
-            prop_assert_eq!(state(&device), state(&host));
-        }
+        assert_equal(&both(gpu, || dust(&positions, &[2], &list)));
     }
 }
 

@@ -155,7 +155,15 @@ fn the_state_goes_there_and_comes_back() {
         assert_eq!(moves.backend_note().is_some(), backend == Backend::Gpu);
         moves.read_back().unwrap();
         assert_eq!(stays.mesh().tets, moves.mesh().tets);
-        assert_eq!(stays.softened(), moves.softened());
+        let [one, other] = [stays.softened(), moves.softened()];
+        assert_eq!(one.tets, other.tets);
+        // Tets that a cut made are those of the positions that were cut, which a device rounds in its own way.
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-4 * a;
+        assert!(
+            near(one.volume_fraction, other.volume_fraction),
+            "{one:?}, {other:?}"
+        );
+        assert!(near(one.strongest, other.strongest), "{one:?}, {other:?}");
         // The body has a length of 1: single precision and ten frames.
         let far = farthest(stays.positions(), moves.positions());
         assert!(far < 1e-4, "{turn}: {far}");
