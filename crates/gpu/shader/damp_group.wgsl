@@ -2,9 +2,11 @@
 // `simd_kernel.rs` of incise-xpbd.
 
 fn solve_group(group: u32, lane: u32) {
+    var slot = group * settings.depth * THREADS + lane;
+    let last = slot + (settings.depth - 1u) * THREADS;
+    var corner = corners[slot];
+    var tet = tet_at(slot);
     for (var k = 0u; k < settings.depth; k++) {
-        let slot = (group * settings.depth + k) * THREADS + lane;
-        let corner = corners[slot];
         if corner.x == corner.y {
             // The tets of a cluster are in its first slots.
             return;
@@ -16,10 +18,16 @@ fn solve_group(group: u32, lane: u32) {
             weighted_velocity(corner.z),
             weighted_velocity(corner.w),
         );
-        let damped = damp_tet(tet_at(slot), x, v);
+        // On its way while this tet is damped, as in `group.wgsl`.
+        slot = min(slot + THREADS, last);
+        let next_corner = corners[slot];
+        let next_tet = tet_at(slot);
+        let damped = damp_tet(tet, x, v);
         velocities[corner.x] = vec4(damped.x0.xyz, 0.0);
         velocities[corner.y] = vec4(damped.x1.xyz, 0.0);
         velocities[corner.z] = vec4(damped.x2.xyz, 0.0);
         velocities[corner.w] = vec4(damped.x3.xyz, 0.0);
+        corner = next_corner;
+        tet = next_tet;
     }
 }

@@ -7,19 +7,25 @@ override JACOBI: bool = false;
 @group(0) @binding(8) var<storage, read_write> corrections: array<vec4<f32>>;
 
 fn solve_group(group: u32, lane: u32) {
+    var slot = group * settings.depth * THREADS + lane;
+    let last = slot + (settings.depth - 1u) * THREADS;
+    var corner = corners[slot];
+    var tet = tet_at(slot);
     for (var k = 0u; k < settings.depth; k++) {
-        let slot = (group * settings.depth + k) * THREADS + lane;
-        let corner = corners[slot];
         if corner.x == corner.y {
             // The tets of a cluster are in its first slots.
             return;
         }
         let x = Corners(particles[corner.x], particles[corner.y], particles[corner.z], particles[corner.w]);
+        // What the next tet needs is on its way while this one is solved: a device waits for each load in turn otherwise.
+        let next = min(slot + THREADS, last);
+        let next_corner = corners[next];
+        let next_tet = tet_at(next);
         var multiplier = vec2(0.0);
         if KEEPS {
             multiplier = multipliers[slot];
         }
-        let moved = solve_tet(tet_at(slot), x, JACOBI, &multiplier);
+        let moved = solve_tet(tet, x, JACOBI, &multiplier);
         if KEEPS {
             multipliers[slot] = multiplier;
         }
@@ -34,5 +40,8 @@ fn solve_group(group: u32, lane: u32) {
             particles[corner.z] = moved.x2;
             particles[corner.w] = moved.x3;
         }
+        slot = next;
+        corner = next_corner;
+        tet = next_tet;
     }
 }

@@ -31,9 +31,10 @@ pub(crate) struct Way {
     jacobi: Option<f64>,
 }
 
-pub(crate) const WAYS: [Way; 7] = [
+pub(crate) const WAYS: [Way; 8] = [
     Way::threads("threads, none", "none"),
     Way::threads("threads, serial:10", "serial:10"),
+    Way::threads("threads, pressure:4", "pressure:4"),
     Way::threads("threads, pressure:10", "pressure:10"),
     Way::workgroups("workgroups, pressure:64", "pressure:64"),
     Way::workgroups("workgroups, pressure:128", "pressure:128"),
