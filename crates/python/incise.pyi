@@ -93,6 +93,7 @@ class Body:
         damping: float = 0.0,
         scale: float = 1.0,
         position: ArrayLike | None = None,
+        velocity: ArrayLike | None = None,
         pinned: _Pinned | None = None,
         material: Sequence[_Settings] | None = None,
         volume_compliance: float | None = None,

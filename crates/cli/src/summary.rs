@@ -100,6 +100,11 @@ impl Summary {
                     100.0 * contact.max_depth
                 ),
             ]);
+        } else if self.last.pieces > 1 {
+            counts.add_row([
+                "contacts".to_owned(),
+                "none: without [contact] pieces pass through each other".to_owned(),
+            ]);
         }
         counts.add_row([
             "clusters, colors".to_owned(),

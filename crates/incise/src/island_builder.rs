@@ -5,9 +5,10 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
 use incise_cutting::CuttableMesh;
 use incise_mesh::{ParticleId, TetId, TetMesh};
-use incise_xpbd::Material;
+use incise_xpbd::{ErasedSolver, Material};
 
 use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
@@ -46,6 +47,8 @@ pub(crate) struct IslandBuilder {
     /// Volume compliance of each material's body.
     volume_compliances: Vec<Option<f64>>,
     pub(crate) substeps: Vec<Substeps>,
+    /// The particles of each body that moves at the start, and its velocity in m/s.
+    velocities: Vec<(Range<usize>, DVec3)>,
 }
 
 impl IslandBuilder {
@@ -126,6 +129,10 @@ impl IslandBuilder {
             self.volume_compliances.push(body.volume_compliance);
             self.substeps.push(body.substeps);
         }
+        if body.velocity != DVec3::ZERO {
+            let particles = first..self.mesh.positions.len();
+            self.velocities.push((particles, body.velocity));
+        }
         self.bodies.push(number);
         let id = u32::try_from(number).map_err(|_| value("body", "too many", TOO_MANY))?;
         self.body_of_particle.resize(self.mesh.positions.len(), id);
@@ -162,6 +169,11 @@ impl IslandBuilder {
             solver.set_mass(p, mass);
             if fixed {
                 solver.set_fixed(p, true);
+            }
+        }
+        for (particles, velocity) in &self.velocities {
+            for p in particles.clone().filter(|&p| !self.fixed[p]) {
+                solver.set_velocity(p, *velocity);
             }
         }
         Ok(any)
@@ -203,7 +215,13 @@ pub(crate) fn substeps(
     (most.max(choice.substeps), Some(choice))
 }
 
-/// Returns the demands on substeps of the tets of some materials, for the accuracy of a scene.
+/// Whether all corners of a tet are fixed, so that nothing is solved for it and it has no error.
+pub(crate) fn is_all_fixed(solver: &dyn ErasedSolver, tet: usize) -> bool {
+    let corners = solver.tet_particles(tet);
+    corners.iter().all(|&p| solver.is_fixed(p as usize))
+}
+
+/// Returns the demands on substeps of the tets of some materials that can move, for the accuracy of a scene.
 pub(crate) fn demands(
     spec: &SolverSpec,
     solver: &AnySolver,
@@ -215,7 +233,7 @@ pub(crate) fn demands(
     let materials = solver.materials();
     let limits = largest_kappas(accuracy, materials, tet_solve(spec.tet_solve));
     let all = (0..mesh.tets.len()).map(|t| (t, solver.material_of(t)));
-    all.filter(|&(_, material)| concerns(material))
+    all.filter(|&(t, material)| concerns(material) && !is_all_fixed(solver, t))
         .map(|(t, material)| TetDemand {
             kappa: solver.kappa_of(t, spec.time_step),
             largest_kappa: limits[usize::from(material)],

@@ -1,5 +1,6 @@
 //! [`ResolvedBody`]: a body of a scene with mesh, materials and fixed particles, all values checked.
 
+use glam::DVec3;
 use incise_mesh::TetMesh;
 use incise_meshing::{Shape, generate};
 use incise_xpbd::Material;
@@ -24,6 +25,8 @@ pub(crate) struct ResolvedBody {
     /// Compliance of the volume constraints; `None` without them.
     pub(crate) volume_compliance: Option<f64>,
     pub(crate) substeps: Substeps,
+    /// At the start, in m/s.
+    pub(crate) velocity: DVec3,
 }
 
 impl ResolvedBody {
@@ -62,6 +65,7 @@ impl ResolvedBody {
             .volume_compliance
             .map(|c| within(&format!("{field}.volume_compliance"), c, 0.0, 1e9))
             .transpose()?;
+        let velocity = coordinates(&format!("{field}.velocity"), spec.velocity)?;
         let position = coordinates(&format!("{field}.position"), spec.position)?;
         let mut mesh = load(field, spec, mesh)?;
         for x in &mut mesh.positions {
@@ -111,6 +115,7 @@ impl ResolvedBody {
             empty_regions,
             volume_compliance,
             substeps: spec.substeps.unwrap_or(substeps),
+            velocity,
         })
     }
 }

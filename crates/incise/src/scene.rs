@@ -213,6 +213,10 @@ pub struct BodySpec {
     #[serde(default)]
     #[schemars(extend("unit" = "m"))]
     pub position: [f64; 3],
+    /// Velocity at the start, of all particles that are not fixed.
+    #[serde(default)]
+    #[schemars(extend("unit" = "m/s"))]
+    pub velocity: [f64; 3],
     /// Young's modulus.
     #[serde(default = "soft")]
     #[schemars(extend("unit" = "Pa"), range(min = 1e-6, max = 1e15))]
@@ -277,6 +281,7 @@ impl Default for BodySpec {
             shape: None,
             scale: unit(),
             position: [0.0; 3],
+            velocity: [0.0; 3],
             young_modulus: soft(),
             poisson_ratio: nearly_incompressible(),
             density: water(),

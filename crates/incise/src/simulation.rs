@@ -685,7 +685,7 @@ impl Simulation {
         }
     }
 
-    /// Returns the largest kappa of a tet, `E Δt² / (ρ h²)`, without softening. Up to about 0.5 the motion is accurate.
+    /// Returns the largest kappa of a tet that can move, `E Δt² / (ρ h²)`, without softening. Up to about 0.5 the motion is accurate.
     /// Δt is the substep of the tet's body.
     #[must_use]
     pub fn kappa(&self) -> f64 {

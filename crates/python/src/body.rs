@@ -30,6 +30,8 @@ use crate::value::{scene_of, to_toml};
 ///     Damping time in s; 0 is none.
 /// scale, position : float, (3,) array-like
 ///     Factor on the coordinates of the mesh, then position of its origin in m.
+/// velocity : (3,) array-like, optional
+///     Velocity at the start in m/s, of all particles that are not pinned.
 /// pinned : optional
 ///     Particles that do not move: numbers of points of shape (k,), truth values of shape (n,), a function from points of
 ///     shape (n, 3) in the coordinates of the mesh to truth values of shape (n,), or a region or list of regions in the
@@ -72,8 +74,8 @@ impl Body {
 impl Body {
     #[new]
     #[pyo3(signature = (
-        mesh, *, young_modulus=1e5, poisson_ratio=0.45, density=1000.0, damping=0.0, scale=1.0, position=None, pinned=None,
-        material=None, volume_compliance=None, substeps=None,
+        mesh, *, young_modulus=1e5, poisson_ratio=0.45, density=1000.0, damping=0.0, scale=1.0, position=None, velocity=None,
+        pinned=None, material=None, volume_compliance=None, substeps=None,
     ))]
     #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn python_new(
@@ -84,6 +86,7 @@ impl Body {
         damping: f64,
         scale: f64,
         position: Option<&Bound<'_, PyAny>>,
+        velocity: Option<&Bound<'_, PyAny>>,
         pinned: Option<&Bound<'_, PyAny>>,
         material: Option<&Bound<'_, PyAny>>,
         volume_compliance: Option<f64>,
@@ -111,9 +114,11 @@ impl Body {
                 keys.insert(key.to_owned(), value);
             }
         }
-        if let Some(position) = position {
-            let position = array::vector("position", position)?.to_array();
-            keys.insert("position".to_owned(), position.to_vec().into());
+        for (key, object) in [("position", position), ("velocity", velocity)] {
+            if let Some(object) = object {
+                let vector = array::vector(key, object)?.to_array();
+                keys.insert(key.to_owned(), vector.to_vec().into());
+            }
         }
         let mut particles = None;
         if let Some(pinned) = pinned.filter(|pinned| !pinned.is_none()) {

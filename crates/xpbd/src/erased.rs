@@ -69,7 +69,6 @@ erased! {
     fn materials(&self) -> &[Material];
     fn material_of(&self, tet: usize) -> u16;
     fn density_of(&self, tet: usize) -> f64;
-    fn kappa(&self, substep_time: f64) -> f64;
     fn kappa_of(&self, tet: usize, substep_time: f64) -> f64;
     fn max_speed(&self) -> f64;
     fn softened(&self) -> Softened;

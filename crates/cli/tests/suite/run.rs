@@ -29,6 +29,7 @@ fn a_run_prints_a_table_and_writes_its_files() {
         "smallest child of a cut",
         "tets at start, end",
         "pieces",
+        "none: without [contact] pieces pass through each other",
         "kappa",
         "files are in out",
     ] {

@@ -10,7 +10,7 @@ use incise_xpbd::{ErasedSolver, StepSettings, shortest_substep_of_f32};
 
 use super::Island;
 use crate::accuracy::{DEFAULT_ACCURACY, OutsideVolume, largest_kappas};
-use crate::island_builder::{demands, substeps};
+use crate::island_builder::{demands, is_all_fixed, substeps};
 use crate::method::tet_solve;
 use crate::scene::{Method, Substeps};
 use crate::solver_backend::Measures;
@@ -121,17 +121,18 @@ const SLIVER_ENERGY: f64 = 0.1;
 /// sliver.
 const NO_ENERGY: f64 = 1e-9;
 
-/// Material, kappa and volume of a tet.
+/// Material, kappa and volume of a tet; kappa 0 of one that is fixed.
 pub(super) fn accuracy_data(
     solver: &dyn ErasedSolver,
     tet: usize,
     settings: &StepSettings,
 ) -> (u16, f64, f64) {
-    (
-        solver.material_of(tet),
-        solver.kappa_of(tet, settings.substep_time()),
-        solver.rest_volume(tet),
-    )
+    let kappa = if is_all_fixed(solver, tet) {
+        0.0
+    } else {
+        solver.kappa_of(tet, settings.substep_time())
+    };
+    (solver.material_of(tet), kappa, solver.rest_volume(tet))
 }
 
 /// The longest side of the box around points, 0 without points.
@@ -395,8 +396,10 @@ impl Island {
         }
     }
 
-    /// The largest kappa of a tet, had none been softened. O(tets).
+    /// The largest kappa of a tet that can move, had none been softened. O(tets).
     pub(crate) fn kappa(&self) -> f64 {
-        self.solver.host().kappa(self.settings.substep_time())
+        let solver = self.solver.host();
+        let kappas = (0..solver.tet_count()).map(|t| accuracy_data(solver, t, &self.settings).1);
+        kappas.fold(0.0, f64::max)
     }
 }

@@ -81,6 +81,13 @@ impl Body {
         self
     }
 
+    /// Sets the velocity at the start in m/s, of all particles that are not fixed.
+    #[must_use]
+    pub fn velocity(mut self, velocity: DVec3) -> Self {
+        self.spec.velocity = velocity.to_array();
+        self
+    }
+
     /// Sets a factor on the coordinates of the mesh.
     #[must_use]
     pub fn scale(mut self, scale: f64) -> Self {

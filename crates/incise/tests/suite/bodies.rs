@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use incise::mesh::glam::DVec3;
+use incise::mesh::kuhn_box;
 use incise::scene::Precision;
-use incise::{Scene, Simulation};
+use incise::{Body, Scene, Simulation};
 
 use crate::support::{body, plane, scene, simulation, state, sweep};
 
@@ -339,4 +340,48 @@ fn a_body_far_away_moves_and_is_cut_as_here() {
     }
     assert_eq!(simulation.report().pieces, 4);
     assert!(simulation.positions()[0].z < simulation.mesh().positions[0].z - 0.05);
+}
+
+/// A body with a velocity flies on by it; what is fixed of it stays, and so does a body without one.
+#[test]
+fn bodies_start_with_their_velocities() {
+    let velocity = DVec3::new(0.5, -0.25, 2.0);
+    let fixed = "fixed = [{ half_space = { point = [0, 0, 0], normal = [0, 0, 1] } }]\n";
+    let moving = |at| body("sphere", 300, at) + "velocity = [0.5, -0.25, 2.0]\n";
+    let bodies = [
+        moving([0.0; 3]),
+        body("sphere", 300, [3.0, 0.0, 0.0]),
+        moving([0.0, 5.0, 0.0]) + fixed,
+    ];
+    for precision in ["f32", "f64"] {
+        let solver = format!("[solver]\nprecision = \"{precision}\"\nsubsteps = 40\n");
+        let mut simulation = simulation(&scene(&(solver + &bodies.concat())));
+        let start = simulation.positions().to_vec();
+        let added = Body::new(kuhn_box([2; 3], DVec3::ONE))
+            .position(DVec3::X * 6.0)
+            .velocity(velocity);
+        simulation.add_body(added).unwrap();
+        let start_of_added = simulation.positions()[start.len()..].to_vec();
+        for _ in 0..10 {
+            simulation.step().unwrap();
+        }
+        let way = velocity * (10.0 * simulation.time_step());
+        let now = simulation.positions();
+        let third = start.len() / 3;
+        for p in 0..third {
+            assert!(now[p].distance(start[p] + way) < 1e-4, "{}", now[p]);
+            assert!(now[third + p].distance(start[third + p]) < 1e-5);
+            if start[2 * third + p].z >= 0.0 {
+                assert_eq!(now[2 * third + p], start[2 * third + p]);
+            }
+        }
+        for (x, from) in now[start.len()..].iter().zip(&start_of_added) {
+            assert!(x.distance(*from + way) < 1e-4, "{x}");
+        }
+    }
+    let wrong = "velocity = [1e10, 0, 0]\n";
+    let error = Scene::from_toml(&(body("sphere", 300, [0.0; 3]) + wrong))
+        .and_then(|scene| Simulation::new(&scene))
+        .unwrap_err();
+    assert!(error.to_string().contains("body[0].velocity"), "{error}");
 }

@@ -381,6 +381,49 @@ fn inner_edges_are_not_felt() {
     }
 }
 
+/// A block with a speed slides on a fixed sheet whose edges are as long as its own, half of them or a quarter: friction
+/// stops it after the same way, though triangles of the block have up to sixteen times as many vertices below them, and more
+/// colors.
+#[test]
+fn the_density_of_a_sheet_is_not_felt() {
+    let slide = |density: usize| {
+        let mut builder = Simulation::builder();
+        builder.gravity(GRAVITY).solver(solver(Precision::F64, 20));
+        let sheet = kuhn_box([10 * density, 4 * density, 1], dvec3(0.5, 0.2, 0.05));
+        builder.add_body(Body::new(sheet).pinned(|_| true));
+        let block = Body::new(kuhn_box([2, 2, 1], dvec3(0.1, 0.1, 0.05)));
+        let block = block.position(dvec3(0.063, 0.047, 0.05));
+        builder.add_body(block.young_modulus(1e6).damping(0.01));
+        builder.contact(with_friction(0.3));
+        let mut simulation = builder.build().unwrap();
+        // It lies down first.
+        steps(&mut simulation, 10);
+        simulation
+            .set_velocities(|x| if x.z > 0.049 { DVec3::X } else { DVec3::ZERO })
+            .unwrap();
+        let count = simulation.positions().len();
+        let block = count - 3 * 3 * 2..count;
+        let start = center(&simulation, block.clone());
+        let mut colors = 0;
+        for _ in 0..30 {
+            steps(&mut simulation, 1);
+            let contact = simulation.report().contact.unwrap();
+            colors = colors.max(contact.colors);
+        }
+        (center(&simulation, block) - start, colors)
+    };
+    // The way until friction has taken the kinetic energy.
+    let way = 1.0 / (2.0 * 0.3 * GRAVITY.length());
+    let mut least = 0;
+    for density in [1, 2, 4] {
+        let (moved, colors) = slide(density);
+        assert!((moved.x / way - 1.0).abs() < 0.02, "{moved} at {density}");
+        assert!(moved.y.abs() < 0.02 * way, "{moved} at {density}");
+        assert!(colors > least, "{colors} colors at {density}");
+        least = colors;
+    }
+}
+
 /// The sides of a cut slide past each other by several edges without friction: where their contact passes from pairs to
 /// vertices and triangles, and from triangle to triangle, the speed does not jump.
 #[test]

@@ -261,6 +261,28 @@ fn auto_is_the_number_it_chooses() {
     assert!(state(&auto) == state(&named));
 }
 
+/// A stiff body that is fixed throughout does not move, so it asks for nothing.
+#[test]
+fn a_fixed_body_asks_for_no_substeps() {
+    let fixed = |region: &str| {
+        let stiff = with_modulus(&body("box", 200, [0.0; 3]), "1e9");
+        let scene = scene(&format!("{AUTO}{stiff}fixed = [{region}]\n"));
+        let mut simulation = simulation(&scene);
+        let report = simulation.step().unwrap();
+        let (choice, warnings) = (report.bodies[0].choice.unwrap(), report.warnings().len());
+        (choice, warnings, simulation.kappa())
+    };
+    let all = "{ half_space = { point = [9, 0, 0], normal = [-1, 0, 0] } }";
+    let (choice, warnings, kappa) = fixed(all);
+    assert_eq!((choice.substeps_wanted, choice.shortfall), (1, None));
+    assert_eq!((choice.expected_error, warnings, kappa), (0.0, 0, 0.0));
+    // Half of it can move.
+    let half = "{ half_space = { point = [0, 0, 0], normal = [-1, 0, 0] } }";
+    let (choice, warnings, kappa) = fixed(half);
+    assert!(choice.substeps_wanted > 100, "{choice:?}");
+    assert!(warnings > 0 && kappa > 0.5);
+}
+
 /// A cut leaves tets that need five times the substeps of the start, and cuts at most double them: the report has the error
 /// of the number taken, and the warning names a setting that helps.
 #[test]
