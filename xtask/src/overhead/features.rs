@@ -7,8 +7,8 @@
 use incise::Scene;
 use incise::scene::{
     AttachmentSpec, BodySpec, ColliderSpec, ContactSpec, DistanceSpec, EndSpec, GroundSpec, Method,
-    Precision, Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, StrokeSpec,
-    Substeps, TetSolve,
+    Precision, Quantity, ReclusterSpec, Region, ReportSpec, ShapeSpec, SleepSpec, SolverSpec,
+    StrokeSpec, Substeps, TetSolve,
 };
 
 /// State of a feature in a scene.
@@ -47,7 +47,7 @@ pub(crate) struct Case {
 impl Case {
     /// Unique among the cases.
     pub(crate) fn id(&self) -> String {
-        format!("{}-{}", self.feature.replace(' ', "-"), self.state.name())
+        id(self.feature, self.state.name())
     }
 
     pub(crate) fn scene(&self, tets: usize) -> Scene {
@@ -55,6 +55,11 @@ impl Case {
         (self.change)(&mut scene);
         scene
     }
+}
+
+/// The name of a case.
+pub(crate) fn id(feature: &str, state: &str) -> String {
+    format!("{}-{state}", feature.replace(' ', "-"))
 }
 
 /// Name of the base without features.
@@ -295,6 +300,9 @@ pub(crate) fn cases() -> Vec<Case> {
             s.solver.method = Method::Chebyshev;
             s.solver.relaxation = 0.1;
         }),
+        case("vbd", Used, "one substep of 20 iterations", |s| {
+            s.solver = SolverSpec::of(Method::Vbd);
+        }),
         case("kappa limit", Idle, "1e9, nothing is softened", |s| {
             s.solver.kappa_limit = 1e9;
         }),
@@ -303,6 +311,7 @@ pub(crate) fn cases() -> Vec<Case> {
         }),
         case("substeps auto", Used, "which takes 2 as well", |s| {
             s.solver.substeps = Substeps::Auto;
+            s.solver.method = Method::GaussSeidel;
             s.solver.max_substeps = 2;
             s.body[0].young_modulus = 1e8;
         }),

@@ -42,6 +42,12 @@ pub(crate) struct Row {
     sizes: Vec<Measured>,
 }
 
+impl Row {
+    fn id(&self) -> String {
+        features::id(&self.feature, &self.state)
+    }
+}
+
 /// Bare scene as a handwritten loop, and that loop without a body.
 const BY_HAND: [(Way, &str); 2] = [
     (Way::Hand, "the solver alone"),

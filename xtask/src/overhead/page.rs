@@ -1,6 +1,6 @@
 //! Page of the experiment: undeclared features, declared but idle ones, and those in use.
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 
 use super::Row;
 use super::callgrind::Counts;
@@ -8,54 +8,103 @@ use super::features::{BARE, State};
 use super::measure::{Device, FRAMES, Measured};
 use crate::experiment::{Page, Part, Table};
 
-/// Features and their own modules: instructions of a bare frame in these modules are the cost of an undeclared feature.
-const MODULES: [(&str, &[&str]); 12] = [
-    (
-        "attachments",
-        &["xpbd::constraints::attachments", "incise::attachment"],
-    ),
-    (
-        "distances",
-        &["xpbd::constraints::distances", "incise::distance"],
-    ),
-    (
-        "volume constraints",
-        &["xpbd::constraints::volumes", "incise::volume"],
-    ),
-    (
-        "colliders, ground",
-        &[
+/// A feature with functions of its own. What a bare frame spends in them is the cost of a feature that is not declared.
+struct Feature {
+    name: &'static str,
+    /// Parts of the names of its functions.
+    functions: &'static [&'static str],
+    /// The case in which they run: functions that are renamed would cost nothing without a word.
+    seen_in: &'static str,
+}
+
+const FEATURES: [Feature; 14] = [
+    Feature {
+        name: "attachments",
+        functions: &["xpbd::constraints::attachments", "incise::attachment"],
+        seen_in: "attachment-used",
+    },
+    Feature {
+        name: "distances",
+        functions: &["xpbd::constraints::distances", "incise::distance"],
+        seen_in: "distance-used",
+    },
+    Feature {
+        name: "volume constraints",
+        functions: &["xpbd::constraints::volumes", "incise::volume"],
+        seen_in: "volume-constraints-used",
+    },
+    Feature {
+        name: "colliders, ground",
+        functions: &[
             "xpbd::constraints::colliders",
             "xpbd::collider",
             "incise::collider",
         ],
-    ),
-    ("Jacobi, Chebyshev", &["xpbd::jacobi"]),
-    ("vbd", &["xpbd::vbd", "incise::vbd"]),
-    (
-        "strokes, pieces",
-        &["incise::strokes", "incise::pieces", "incise_cutting"],
-    ),
-    (
-        "clusters, colors, reclustering",
-        &[
-            "incise::plan",
+        seen_in: "collider-used",
+    },
+    Feature {
+        name: "contact",
+        functions: &[
+            "xpbd::constraints::contacts",
+            "incise::contacts",
+            "incise_contact",
+        ],
+        seen_in: "contact-used",
+    },
+    Feature {
+        name: "Jacobi, Chebyshev",
+        functions: &["xpbd::jacobi"],
+        seen_in: "jacobi-used",
+    },
+    Feature {
+        name: "VBD",
+        functions: &["xpbd::vbd", "incise::vbd"],
+        seen_in: "vbd-used",
+    },
+    Feature {
+        name: "strokes, pieces",
+        functions: &["incise::strokes", "incise::pieces", "incise_cutting"],
+        seen_in: "blade-used",
+    },
+    Feature {
+        name: "clusters, colors, reclustering",
+        functions: &[
+            "incise::partition",
             "incise::recluster",
             "incise_clustering",
             "incise_coloring",
         ],
-    ),
-    (
-        "reports",
-        &["incise::measure", "xpbd::measure", "xpbd::residuals"],
-    ),
-    ("sleep", &["incise::sleep"]),
-    ("bodies far from the origin", &["xpbd::floating_origin"]),
-    ("bodies on a line", &["xpbd::degeneracy_jitter"]),
+        seen_in: "recluster-idle",
+    },
+    Feature {
+        name: "reports",
+        functions: &["incise::measure", "xpbd::measure", "xpbd::residuals"],
+        seen_in: "report-residual-used",
+    },
+    Feature {
+        name: "sleep",
+        functions: &["incise::sleep"],
+        seen_in: "sleep-used",
+    },
+    Feature {
+        name: "bodies far from the origin",
+        functions: &["xpbd::floating_origin"],
+        seen_in: "bare-base",
+    },
+    Feature {
+        name: "bodies on a line",
+        functions: &["xpbd::degeneracy_jitter"],
+        seen_in: "bare-base",
+    },
+    Feature {
+        name: "the largest speed, for the warning of divergence",
+        functions: &["ErasedSolver>::max_speed"],
+        seen_in: "bare-base",
+    },
 ];
 
-/// Function of the library with a pass over the particles that every frame needs.
-const POSITIONS: &str = "AnySolver::positions";
+/// The copy of positions that every frame makes is inlined into this function.
+const POSITIONS: &str = "SpecExtend";
 
 const INTRODUCTION: &str = "\
 Costs of features that a scene does not declare, declares without using, and uses. The scene is a beam that \
@@ -64,9 +113,9 @@ floats at rest, in 2 substeps of 1 iteration; nothing acts on it, nothing is hel
 *Undeclared* cannot be measured by leaving a key out: that is the bare scene itself. Three things are measured instead. \
 The bare scene is compared with a hand-written loop over the same mesh and schedule: `incise_xpbd::Solver::step` and a copy of \
 the positions. That loop has no scenes, strokes, pieces, reports, sleep or attachments. The additional cost of the \
-scene must be a constant, equal for every size of mesh: then no undeclared feature has a pass over particles or tets. \
-This holds for branches to the digit; for instructions the compiler blurs it, since it makes one copy of the solver \
-for the facade and another for the hand-written loop, which differ by some instructions a particle. Second, \
+scene must be a constant but for one pass over the particles, the largest speed, by which a motion that diverges is a \
+warning. The compiler blurs it, since it makes one copy of the solver for the facade and another for the hand-written \
+loop, which differ by some instructions a particle. Second, \
 the solver's own step without a body: it contains all checks for undeclared constraints, which run once a substep or \
 once a frame, so it is an upper bound. Third, the instructions of a bare frame by function, summed over the modules \
 that \
@@ -76,8 +125,8 @@ Not covered: a branch within the loops over particles and tets, which both loops
 block of 4 to 16 tets, the same every time (whether multipliers are kept, whether corrections are collected as Jacobi \
 does, whether materials differ); for each particle, whether it is held, and whether there is gravity. And bytes that the \
 solver holds whatever a scene declares: a byte a particle for being fixed, two a tet for its material, eight a tet for \
-its volume at rest. One pass a frame is for what no scene declares: the bounding box, by which a body that moves far away \
-keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, \
+its volume at rest. Two passes a frame are for what no scene declares: the largest speed, and the bounding box, by which a body that moves \
+far away keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, \
 and clusters and colors that can be updated.
 
 Instructions are Callgrind's, on one thread, mean of 4 frames after the first 3; on a processor as valgrind \
@@ -97,6 +146,9 @@ pub(crate) fn page(rows: &[Row]) -> anyhow::Result<Page> {
     };
     let (bare, hand, empty) = (find(BARE)?, find("hand")?, find("empty")?);
     parts.push(Part::Table(undeclared(bare, hand, empty)));
+    for feature in &FEATURES {
+        check_names(feature, rows)?;
+    }
     parts.push(Part::Table(modules(bare)));
     let declared = [
         declared_table("Declared and idle", rows, State::Idle),
@@ -179,6 +231,23 @@ fn undeclared(bare: &Row, hand: &Row, empty: &Row) -> Table {
     table
 }
 
+/// An error if the functions of a feature do not run where it is in use: they have other names then.
+fn check_names(feature: &Feature, rows: &[Row]) -> anyhow::Result<()> {
+    let case = rows.iter().find(|row| row.id() == feature.seen_in);
+    let counts = case.and_then(|row| row.sizes.last()?.counts.as_ref());
+    let Some(counts) = counts else {
+        return Ok(());
+    };
+    ensure!(
+        counts.of(feature.functions) > 0,
+        "{}: no function of {:?} runs in {}",
+        feature.name,
+        feature.functions,
+        feature.seen_in
+    );
+    Ok(())
+}
+
 /// The instructions of a bare frame in modules of features that are not declared.
 fn modules(bare: &Row) -> Table {
     let mut header = vec!["feature".to_owned()];
@@ -195,13 +264,12 @@ fn modules(bare: &Row) -> Table {
         }));
         table.push(row);
     };
-    for (feature, parts) in MODULES {
-        push(feature, &|counts| counts.of(parts));
+    for feature in &FEATURES {
+        push(feature.name, &|counts| counts.of(feature.functions));
     }
-    push(
-        "the whole facade but for the copy of positions",
-        &|counts| counts.of(&["incise::"]) - counts.of(&[POSITIONS]),
-    );
+    push("functions of the facade alone", &|counts| {
+        counts.of(&["incise::"])
+    });
     push("clocks for the report's times", &|counts| {
         counts.of(&["Timespec", "clock_gettime", "time::Instant"])
     });
