@@ -6,15 +6,24 @@
 //!
 //! Sliding: a soft block that is cut into ten slices while it falls, where nearly every vertex moves.
 //!
-//! Depths: stacks of cubes, and a pile of organs in a box, in percent of the mean edge.
+//! Depths: stacks of cubes, and a pile of organs in a box, in percent of the mean edge; with `--python` in two other systems,
+//! too.
 
+mod peers;
+
+use std::path::PathBuf;
+
+use clap::Args;
 use incise::mesh::glam::{DVec3, dvec3};
-use incise::mesh::kuhn_box;
+use incise::mesh::{TetMesh, kuhn_box};
 use incise::meshing::{Shape, generate};
-use incise::scene::{ColliderSpec, ContactSpec, Method, Precision, SolverSpec, StrokeSpec};
+use incise::scene::{
+    BodySpec, ColliderSpec, ContactSpec, Method, Precision, SolverSpec, StrokeSpec,
+};
 use incise::{Body, FrameReport, Simulation, SimulationBuilder};
 use serde::{Deserialize, Serialize};
 
+use self::peers::{End, Plane, Scene};
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table, median};
 
 /// Substeps of a frame of the liver.
@@ -32,6 +41,16 @@ enum Row {
     Cost(Cost),
     Slices(Slices),
     Depth(Depth),
+    End(End),
+}
+
+#[derive(Debug, Args)]
+pub(crate) struct ContactArguments {
+    #[command(flatten)]
+    experiment: ExperimentArguments,
+    /// Run stacks and a pile in other systems as well, with this Python; it needs the packages pbatoolkit and newton.
+    #[arg(long, value_name = "FILE")]
+    python: Option<PathBuf>,
 }
 
 /// What contact costs in a scene.
@@ -91,9 +110,17 @@ struct Depth {
     repaired: usize,
 }
 
+/// Runs this experiment as part of `all`, without other systems.
+pub(crate) fn usual(arguments: &ExperimentArguments) -> anyhow::Result<()> {
+    run(&ContactArguments {
+        experiment: arguments.clone(),
+        python: None,
+    })
+}
+
 /// Measures and writes the page.
-pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
-    let quick = arguments.quick;
+pub(crate) fn run(arguments: &ContactArguments) -> anyhow::Result<()> {
+    let quick = arguments.experiment.quick;
     let all = std::thread::available_parallelism().map_or(1, usize::from);
     let mut threads = vec![1, all];
     threads.dedup();
@@ -127,12 +154,28 @@ pub(crate) fn run(arguments: &ExperimentArguments) -> anyhow::Result<()> {
         };
         depth("eight organs in a box", pile(tets)?, frames).map(Row::Depth)
     }));
+    for scene in ["stack-2", "stack-5", "stack-10", "pile"] {
+        let Some(python) = &arguments.python else {
+            break;
+        };
+        cells.push(Cell::new(format!("incise-{scene}"), move || {
+            let (scene, builder) = peer_scene(scene, quick)?;
+            peers::ours(&scene, builder).map(Row::End)
+        }));
+        for peer in peers::PEERS {
+            let python = python.clone();
+            cells.push(Cell::new(format!("{}-{scene}", peer.id), move || {
+                let (scene, _) = peer_scene(scene, quick)?;
+                Ok(Row::End(peers::run(&peer, &scene, &python)))
+            }));
+        }
+    }
     let experiment = Experiment {
         name: "contact",
         cells,
         page,
     };
-    experiment.run(arguments)
+    experiment.run(&arguments.experiment)
 }
 
 fn solver(substeps: u32) -> SolverSpec {
@@ -277,44 +320,109 @@ fn slices(young_modulus: f64, quick: bool) -> anyhow::Result<Slices> {
     })
 }
 
-/// Cubes on each other, each shifted by a third of a cell against the one below.
-fn stack(count: u32) -> SimulationBuilder {
+/// A mesh moved to a place.
+fn placed(mut mesh: TetMesh, at: DVec3) -> TetMesh {
+    mesh.positions.iter_mut().for_each(|x| *x += at);
+    mesh
+}
+
+/// The cubes of a stack, each shifted by a third of a cell against the one below.
+fn cubes(count: u32) -> impl Iterator<Item = TetMesh> {
     const EDGE: f64 = 0.25;
+    (0..count).map(|number| {
+        let shift = if number % 2 == 1 { EDGE / 6.0 } else { 0.0 };
+        let at = dvec3(shift, 0.5 * shift, EDGE * f64::from(number));
+        placed(kuhn_box([2; 3], DVec3::splat(EDGE)), at)
+    })
+}
+
+/// Eight livers of 10 cm above a box, in two layers.
+fn organs(tets: usize) -> anyhow::Result<Vec<TetMesh>> {
+    let mut mesh = generate(Shape::Liver, tets)?;
+    mesh.positions.iter_mut().for_each(|x| *x *= 0.1);
+    let places = (0..8_u32).map(|number| {
+        let [x, y, z] = [number & 1, number >> 1 & 1, number >> 2].map(f64::from);
+        dvec3(0.1 * (x - 0.5), 0.1 * (y - 0.5), 0.06 + 0.11 * z + 0.01 * x)
+    });
+    Ok(places.map(|at| placed(mesh.clone(), at)).collect())
+}
+
+/// The directions of the walls of the box, into it.
+const WALLS: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
+
+/// Cubes on each other.
+fn stack(count: u32) -> SimulationBuilder {
     let mut builder = Simulation::builder();
     builder
         .gravity(DVec3::NEG_Z * 9.81)
         .ground(0.0, 0.5)
         .solver(solver(60));
-    for number in 0..count {
-        let shift = if number % 2 == 1 { EDGE / 6.0 } else { 0.0 };
-        let at = dvec3(shift, 0.5 * shift, EDGE * f64::from(number));
-        let cube = Body::new(kuhn_box([2; 3], DVec3::splat(EDGE))).position(at);
-        builder.add_body(cube.young_modulus(2e7).damping(0.005));
+    for cube in cubes(count) {
+        builder.add_body(Body::new(cube).young_modulus(2e7).damping(0.005));
     }
     builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
     builder
 }
 
-/// Eight livers of 10 cm that fall into a box, in two layers.
+/// The organs fall into the box.
 fn pile(tets: usize) -> anyhow::Result<SimulationBuilder> {
     let mut builder = Simulation::builder();
     builder
         .gravity(DVec3::NEG_Z * 9.81)
         .ground(0.0, 0.5)
         .solver(solver(SUBSTEPS));
-    let mesh = generate(Shape::Liver, tets)?;
-    for number in 0..8_u32 {
-        let [x, y, z] = [number & 1, number >> 1 & 1, number >> 2].map(f64::from);
-        let at = dvec3(0.1 * (x - 0.5), 0.1 * (y - 0.5), 0.06 + 0.11 * z + 0.01 * x);
-        let body = Body::new(mesh.clone()).scale(0.1).position(at);
-        builder.add_body(body.young_modulus(2e4).density(1050.0).damping(0.005));
+    for organ in organs(tets)? {
+        builder.add_body(
+            Body::new(organ)
+                .young_modulus(2e4)
+                .density(1050.0)
+                .damping(0.005),
+        );
     }
-    for [x, y] in [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]] {
+    for [x, y] in WALLS {
         let wall = ColliderSpec::plane([-0.11 * x, -0.11 * y, 0.0], [x, y, 0.0]);
         builder.add_collider(wall.with_friction(0.2));
     }
     builder.contact(ContactSpec::default());
     Ok(builder)
+}
+
+/// A stack or the pile for other systems, and for this one.
+fn peer_scene(name: &str, quick: bool) -> anyhow::Result<(Scene, SimulationBuilder)> {
+    let mut scene = Scene {
+        name: String::new(),
+        bodies: Vec::new(),
+        planes: vec![Plane {
+            point: DVec3::ZERO,
+            normal: DVec3::Z,
+        }],
+        young_modulus: 2e7,
+        poisson_ratio: BodySpec::default().poisson_ratio,
+        density: BodySpec::default().density,
+        friction: 0.5,
+        gravity: DVec3::NEG_Z * 9.81,
+        time_step: 1.0 / 60.0,
+        substeps: 60,
+        frames: 0,
+    };
+    if let Some(count) = name.strip_prefix("stack-") {
+        let count = count.parse()?;
+        scene.name = format!("stack of {count} cubes");
+        scene.bodies = cubes(count).collect();
+        scene.frames = if quick { 8 } else { 90 + 20 * count };
+        return Ok((scene, stack(count)));
+    }
+    let tets = if quick { 200 } else { 1_000 };
+    scene.name = "eight organs in a box".to_owned();
+    scene.bodies = organs(tets)?;
+    scene.planes.extend(WALLS.map(|[x, y]| Plane {
+        point: dvec3(-0.11 * x, -0.11 * y, 0.0),
+        normal: dvec3(x, y, 0.0),
+    }));
+    (scene.young_modulus, scene.density) = (2e4, 1050.0);
+    (scene.friction, scene.substeps) = (0.0, SUBSTEPS);
+    scene.frames = if quick { 8 } else { 230 };
+    Ok((scene, pile(tets)?))
 }
 
 /// Runs a scene and looks at its last frames.
@@ -395,8 +503,10 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             "repaired",
         ],
     );
+    let mut ends = Vec::new();
     for row in rows {
         match row {
+            Row::End(end) => ends.push(end),
             Row::Cost(cost) => {
                 let lies = cost.scene.starts_with("upper");
                 costs.push([
@@ -459,16 +569,20 @@ fn page(rows: &[Row]) -> anyhow::Result<Page> {
             }
         }
     }
+    let mut parts = vec![
+        Part::Text(INTRODUCTION.to_owned()),
+        Part::Table(costs),
+        Part::Text(COSTS.to_owned()),
+        Part::Table(sliding),
+        Part::Table(depths),
+        Part::Text(AIMS.to_owned()),
+    ];
+    if !ends.is_empty() {
+        parts.push(Part::Table(peers::table(ends.into_iter())));
+    }
     Ok(Page {
         title: "Contact".to_owned(),
-        parts: vec![
-            Part::Text(INTRODUCTION.to_owned()),
-            Part::Table(costs),
-            Part::Text(COSTS.to_owned()),
-            Part::Table(sliding),
-            Part::Table(depths),
-            Part::Text(PEERS.to_owned()),
-        ],
+        parts,
     })
 }
 
@@ -481,6 +595,7 @@ const COSTS: &str = "The share has all that a frame takes longer: finding and co
 the solver over the contacts (once a substep). Time by stage of the search is in `cargo bench --bench contact`. A scene \
 without `[contact]` is a row of [the overhead page](overhead.md).";
 
-const PEERS: &str = "The aims: 0.1% of an edge in a stack, 1% in a body at rest on itself, 10% in a pile of organs. No \
-other system that was found states depth as a part of an edge. Two have stacks and piles of soft bodies of their own \
-(pbatoolkit, Newton); they are Python packages that this command does not install, so they have no rows.";
+const AIMS: &str = "The aims: 0.1% of an edge in a stack, 1% in a body at rest on itself, 10% in a pile of organs. No \
+other system that was found states depth as a part of an edge. `--python FILE` runs the stacks and the pile in two of them: \
+the deepest vertex of a body inside a tet of another one, at the end, measured alike in all three. It is not the depth of a \
+contact, which the table above has.";

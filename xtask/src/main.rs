@@ -86,7 +86,7 @@ const EXPERIMENTS: &[(&str, Run)] = &[
     ("defaults", defaults::all),
     ("overhead", overhead::run),
     ("comparison", comparison::usual),
-    ("contact", contact::run),
+    ("contact", contact::usual),
 ];
 
 #[derive(Debug, Subcommand)]
@@ -96,7 +96,7 @@ enum Command {
     /// Cluster and color meshes by all methods, and write tables.
     Coloring(coloring::ColoringArguments),
     /// Measure the cost of contact and the depth of stacks and piles, and write a page.
-    Contact(ExperimentArguments),
+    Contact(contact::ContactArguments),
     /// Measure the cost of cuts by stage and mesh size, and the effect of snapping.
     Cutting(cutting::CuttingArguments),
     /// Default settings: errors against Newton's method, and bodies after cuts, under load and at rest.
