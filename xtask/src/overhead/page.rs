@@ -17,21 +17,16 @@ struct Feature {
     seen_in: &'static str,
 }
 
-const FEATURES: [Feature; 14] = [
+const FEATURES: [Feature; 12] = [
     Feature {
         name: "attachments",
         functions: &["xpbd::constraints::attachments", "incise::attachment"],
         seen_in: "attachment-used",
     },
     Feature {
-        name: "distances",
-        functions: &["xpbd::constraints::distances", "incise::distance"],
+        name: "distances, volume constraints",
+        functions: &["xpbd::constraints::scalar"],
         seen_in: "distance-used",
-    },
-    Feature {
-        name: "volume constraints",
-        functions: &["xpbd::constraints::volumes", "incise::volume"],
-        seen_in: "volume-constraints-used",
     },
     Feature {
         name: "colliders, ground",
@@ -63,7 +58,12 @@ const FEATURES: [Feature; 14] = [
     },
     Feature {
         name: "strokes, pieces",
-        functions: &["incise::strokes", "incise::pieces", "incise_cutting"],
+        functions: &[
+            "incise::strokes",
+            "incise::pieces",
+            "incise_cutting",
+            "xpbd::constraints::blades",
+        ],
         seen_in: "blade-used",
     },
     Feature {
@@ -80,11 +80,6 @@ const FEATURES: [Feature; 14] = [
         name: "reports",
         functions: &["incise::measure", "xpbd::measure", "xpbd::residuals"],
         seen_in: "report-residual-used",
-    },
-    Feature {
-        name: "sleep",
-        functions: &["incise::sleep"],
-        seen_in: "sleep-used",
     },
     Feature {
         name: "bodies far from the origin",
@@ -125,8 +120,9 @@ Not covered: a branch within the loops over particles and tets, which both loops
 block of 4 to 16 tets, the same every time (whether multipliers are kept, whether corrections are collected as Jacobi \
 does, whether materials differ); for each particle, whether it is held, and whether there is gravity. And bytes that the \
 solver holds whatever a scene declares: a byte a particle for being fixed, two a tet for its material, eight a tet for \
-its volume at rest. Two passes a frame are for what no scene declares: the largest speed, and the bounding box, by which a body that moves \
-far away keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary and pieces of its mesh, \
+its volume at rest. Two passes a frame are for what no scene declares: the largest speed, and the bounding box, by which \
+a body that moves far away keeps its precision. Any simulation can be cut at any time, so each keeps neighbors, boundary \
+and pieces of its mesh, \
 and clusters and colors that can be updated.
 
 Instructions are Callgrind's, on one thread, mean of 4 frames after the first 3; on a processor as valgrind \

@@ -104,6 +104,13 @@ fn only_declared_features_are_sent_to_a_device() {
     assert_eq!(told(case("ground", State::Idle)).dispatches, 2 * 4 * frames);
 }
 
+/// Functions that run in every scene.
+const EVERYWHERE: [&str; 3] = [
+    "incise_xpbd::floating_origin::recenter",
+    "incise_xpbd::degeneracy_jitter::jitter",
+    "<Solver as ErasedSolver>::max_speed",
+];
+
 /// A scene of one or two thousand particles whose frames take `each` instructions per particle and `once` more.
 fn row(feature: &str, state: State, each: u64, once: u64) -> Row {
     let size = |particles: usize| Measured {
@@ -116,6 +123,7 @@ fn row(feature: &str, state: State, each: u64, once: u64) -> Row {
         },
         counts: Some(Counts {
             instructions: u64::from(measure::FRAMES) * (each * particles as u64 + once),
+            functions: EVERYWHERE.map(|name| (name.to_owned(), 1)).into(),
             ..Counts::default()
         }),
         device: None,
@@ -156,6 +164,11 @@ fn the_page_distinguishes_constants_from_passes() {
     assert_eq!(idle.rows[0][2..6], ["12", "0.012", "0", "0.00"]);
     let used = page::declared_table("", &rows, State::Used).unwrap();
     assert_eq!(used.rows[0][2..6], ["16000", "15.995", "0", "8.00"]);
+    // A feature in use of which no function runs has functions of other names.
+    let mut renamed = rows.clone();
+    renamed.push(row("jacobi", State::Used, 50, 30));
+    let error = page::page(&renamed).unwrap_err().to_string();
+    assert!(error.contains("Jacobi"), "{error}");
     for row in &mut rows {
         row.valgrind = None;
         row.sizes.iter_mut().for_each(|size| size.counts = None);
