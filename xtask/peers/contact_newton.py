@@ -7,14 +7,13 @@ IN.json holds the bodies (tetrahedra), the half-spaces and the material, OUT.jso
 mesh; "best" takes those that penetrated least in a few tries. Newton wants bodies apart at the start, so each is
 raised by the contact distance times half plus the height of its centroid in its own heights.
 """
-import json
-import sys
-
 import numpy as np
 import warp as wp
 
 wp.config.quiet = True
 import newton
+
+import common
 
 # Distances in mean edges of the surfaces, stiffness in units of the shear modulus times one metre.
 CHOICES = {
@@ -27,18 +26,15 @@ def mean_edge(bodies):
     """Mean edge length of the surface triangles of all bodies."""
     lengths = []
     for points, tets in bodies:
-        faces = np.concatenate([np.delete(tets, corner, 1) for corner in range(4)])
-        _, inverse, count = np.unique(np.sort(faces, 1), axis=0, return_inverse=True, return_counts=True)
-        corners = points[faces[count[inverse.ravel()] == 1]]
+        corners = points[common.surface(tets)]
         lengths.append(np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).mean())
     return float(np.mean(lengths))
 
 
 def prepare(scene, choice="best"):
     """The sentence on the settings, and an iterator over the positions of all bodies after each frame."""
-    young, poisson = scene["young_modulus"], scene["poisson_ratio"]
-    mu, lam = young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
-    bodies = [(np.array(b["positions"], float), np.array(b["tets"], int)) for b in scene["bodies"]]
+    mu, lam = common.lame(scene)
+    bodies = common.bodies(scene)
     use = CHOICES[choice]
     substeps = use["substeps"] or scene["substeps"] + scene["substeps"] % 2  # even, see frames()
     margin = use["margin"] * mean_edge(bodies)
@@ -47,7 +43,7 @@ def prepare(scene, choice="best"):
     builder = newton.ModelBuilder(gravity=tuple(scene["gravity"]))
     surface = newton.ModelBuilder.ShapeConfig(ke=stiffness, kd=damping, mu=scene["friction"])
     for plane in scene["planes"]:
-        normal = np.array(plane["normal"], float) / np.linalg.norm(plane["normal"])
+        normal = common.unit_normal(plane)
         offset = -float(normal @ plane["point"])
         builder.add_shape_plane((*map(float, normal), offset), width=0.0, length=0.0, cfg=surface)
     starts = [0]
@@ -88,20 +84,5 @@ def prepare(scene, choice="best"):
     return settings, frames()
 
 
-def main():
-    scene = json.load(open(sys.argv[1]))
-    settings, frames = prepare(scene, *sys.argv[3:4])
-    for positions in frames:
-        pass
-    if not all(np.isfinite(p).all() for p in positions):
-        raise ValueError("the positions are not finite")
-    json.dump({
-        "system": f"Newton {newton.__version__}, VBD (Warp {wp.__version__}, CPU)", "settings": settings,
-        "positions": [p.tolist() for p in positions]}, open(sys.argv[2], "w"))
-
-
 if __name__ == "__main__":
-    try:
-        main()
-    except Exception as error:
-        sys.exit(f"contact_newton: {' '.join(str(error).split()) or type(error).__name__}")
+    common.run("contact_newton", f"Newton {newton.__version__}, VBD (Warp {wp.__version__}, CPU)", prepare)

@@ -7,11 +7,11 @@ pbatoolkit has no planes, so each half-space is a thick fixed box of tetrahedra.
 settings of its own example (xpbd.py), "best" those that penetrated least in a few tries.
 """
 import itertools
-import json
-import sys
 
 import numpy as np
 from pbatoolkit import pbat, pypbat
+
+import common
 
 # `penalty` multiplies a contact's depth; with `area`, it is per square metre of the vertex's share of the surface.
 # Friction of 0.0.11 adds to the slip instead of taking from it, so "best" gives the kinetic coefficient the other
@@ -27,7 +27,7 @@ def box(plane, low, high):
 
     It has 4 x 4 x 4 cells, because pbatoolkit 0.0.11 can overlook vertices in bodies of a few large tetrahedra.
     """
-    normal = np.array(plane["normal"], float) / np.linalg.norm(plane["normal"])
+    normal = common.unit_normal(plane)
     side = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
     side /= np.linalg.norm(side)
     size = 2 * np.linalg.norm(high - low)
@@ -52,18 +52,10 @@ def oriented(points, tets):
     return tets, np.abs(volumes)
 
 
-def surface(tets):
-    """The triangles that bound the tetrahedra, facing outwards."""
-    faces = np.concatenate([tets[:, [1, 2, 3]], tets[:, [0, 3, 2]], tets[:, [0, 1, 3]], tets[:, [0, 2, 1]]])
-    _, inverse, count = np.unique(np.sort(faces, 1), axis=0, return_inverse=True, return_counts=True)
-    return faces[count[inverse.ravel()] == 1]
-
-
 def prepare(scene, choice="best"):
     """The sentence on the settings, and an iterator over the positions of all bodies after each frame."""
-    young, poisson = scene["young_modulus"], scene["poisson_ratio"]
-    mu, lam = young / (2 * (1 + poisson)), young * poisson / ((1 + poisson) * (1 - 2 * poisson))
-    bodies = [(np.array(b["positions"], float), np.array(b["tets"], np.int64)) for b in scene["bodies"]]
+    mu, lam = common.lame(scene)
+    bodies = common.bodies(scene)
     every = np.concatenate([p for p, _ in bodies])
     free = len(every)
     parts = bodies + [box(plane, every.min(0), every.max(0)) for plane in scene["planes"]]
@@ -76,7 +68,7 @@ def prepare(scene, choice="best"):
     use = CHOICES[choice]
     steps = -(-(use["substeps"] or scene["substeps"]) // use["detect"])
     substeps = steps * use["detect"]
-    faces = surface(tets)
+    faces = common.surface(tets)
     vertices = np.unique(faces)
     vertices = vertices[vertices < free]  # a fixed vertex gets no response anyway
     share = np.zeros(len(points))
@@ -116,19 +108,5 @@ def prepare(scene, choice="best"):
     return settings, frames()
 
 
-def main():
-    scene = json.load(open(sys.argv[1]))
-    settings, frames = prepare(scene, *sys.argv[3:4])
-    for positions in frames:
-        pass
-    if not all(np.isfinite(p).all() for p in positions):
-        raise ValueError("the positions are not finite")
-    json.dump({
-        "system": "pbatoolkit 0.0.11, XPBD", "settings": settings, "positions": [p.tolist() for p in positions]}, open(sys.argv[2], "w"))
-
-
 if __name__ == "__main__":
-    try:
-        main()
-    except Exception as error:
-        sys.exit(f"contact_pbat: {' '.join(str(error).split()) or type(error).__name__}")
+    common.run("contact_pbat", "pbatoolkit 0.0.11, XPBD", prepare)

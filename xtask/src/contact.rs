@@ -17,16 +17,14 @@ use clap::Args;
 use incise::mesh::glam::{DVec3, dvec3};
 use incise::mesh::{TetMesh, kuhn_box};
 use incise::meshing::{Shape, generate};
-use incise::scene::{
-    BodySpec, ColliderSpec, ContactSpec, Method, Precision, SolverSpec, StrokeSpec,
-};
+use incise::scene::{BodySpec, ContactSpec, Method, Precision, SolverSpec, StrokeSpec};
 use incise::{Body, FrameReport, Simulation, SimulationBuilder};
 use serde::{Deserialize, Serialize};
 
 use self::peers::{End, Plane, Scene};
 use crate::experiment::{Cell, Experiment, ExperimentArguments, Page, Part, Table, median};
 
-/// Substeps of a frame of the liver.
+/// Substeps of a frame of a liver.
 const SUBSTEPS: u32 = 30;
 /// Tets of the liver.
 const TETS: usize = 11_000;
@@ -141,33 +139,29 @@ pub(crate) fn run(arguments: &ContactArguments) -> anyhow::Result<()> {
     }
     for count in [2, 5, 10] {
         cells.push(Cell::new(format!("stack-{count}"), move || {
-            let name = format!("stack of {count} cubes");
-            let frames = if quick { [5, 3] } else { [60 + 20 * count, 30] };
-            depth(&name, stack(count), frames).map(Row::Depth)
+            depth(&stack(count, quick)?).map(Row::Depth)
         }));
     }
     cells.push(Cell::new("pile", move || {
-        let (tets, frames) = if quick {
-            (200, [5, 3])
-        } else {
-            (1_000, [200, 30])
-        };
-        depth("eight organs in a box", pile(tets)?, frames).map(Row::Depth)
+        depth(&pile(quick)?).map(Row::Depth)
     }));
-    for scene in ["stack-2", "stack-5", "stack-10", "pile"] {
-        let Some(python) = &arguments.python else {
-            break;
-        };
-        cells.push(Cell::new(format!("incise-{scene}"), move || {
-            let (scene, builder) = peer_scene(scene, quick)?;
-            peers::ours(&scene, builder).map(Row::End)
-        }));
-        for peer in peers::PEERS {
-            let python = python.clone();
-            cells.push(Cell::new(format!("{}-{scene}", peer.id), move || {
-                let (scene, _) = peer_scene(scene, quick)?;
-                Ok(Row::End(peers::run(&peer, &scene, &python)))
+    if let Some(python) = &arguments.python {
+        let scenes: [(&str, MakeScene); 4] = [
+            ("stack-2", |quick| stack(2, quick)),
+            ("stack-5", |quick| stack(5, quick)),
+            ("stack-10", |quick| stack(10, quick)),
+            ("pile", pile),
+        ];
+        for (name, make) in scenes {
+            cells.push(Cell::new(format!("incise-{name}"), move || {
+                peers::ours(&make(quick)?).map(Row::End)
             }));
+            for peer in peers::PEERS {
+                let python = python.clone();
+                cells.push(Cell::new(format!("{}-{name}", peer.id), move || {
+                    Ok(Row::End(peers::run(&peer, &make(quick)?, &python)))
+                }));
+            }
         }
     }
     let experiment = Experiment {
@@ -326,120 +320,83 @@ fn placed(mut mesh: TetMesh, at: DVec3) -> TetMesh {
     mesh
 }
 
-/// The cubes of a stack, each shifted by a third of a cell against the one below.
-fn cubes(count: u32) -> impl Iterator<Item = TetMesh> {
+/// Makes a scene, small where a quick one is asked for.
+type MakeScene = fn(quick: bool) -> anyhow::Result<Scene>;
+
+/// Cubes on each other, each shifted by a third of a cell against the one below.
+fn stack(count: u32, quick: bool) -> anyhow::Result<Scene> {
     const EDGE: f64 = 0.25;
-    (0..count).map(|number| {
+    let bodies = (0..count).map(|number| {
         let shift = if number % 2 == 1 { EDGE / 6.0 } else { 0.0 };
         let at = dvec3(shift, 0.5 * shift, EDGE * f64::from(number));
         placed(kuhn_box([2; 3], DVec3::splat(EDGE)), at)
+    });
+    Ok(Scene {
+        name: format!("stack of {count} cubes"),
+        bodies: bodies.collect(),
+        planes: vec![Plane::new(DVec3::ZERO, DVec3::Z, 0.5)],
+        young_modulus: 2e7,
+        poisson_ratio: BodySpec::default().poisson_ratio,
+        density: BodySpec::default().density,
+        damping: 0.005,
+        friction: 0.5,
+        gravity: DVec3::NEG_Z * 9.81,
+        time_step: 0.016,
+        substeps: 60,
+        frames: if quick { 8 } else { 90 + 20 * count },
+        farthest: 5.0,
     })
 }
 
-/// Eight livers of 10 cm above a box, in two layers.
-fn organs(tets: usize) -> anyhow::Result<Vec<TetMesh>> {
-    let mut mesh = generate(Shape::Liver, tets)?;
+/// Eight livers of 10 cm in two layers fall into a box.
+fn pile(quick: bool) -> anyhow::Result<Scene> {
+    let mut mesh = generate(Shape::Liver, if quick { 200 } else { 1_000 })?;
     mesh.positions.iter_mut().for_each(|x| *x *= 0.1);
     let places = (0..8_u32).map(|number| {
         let [x, y, z] = [number & 1, number >> 1 & 1, number >> 2].map(f64::from);
         dvec3(0.1 * (x - 0.5), 0.1 * (y - 0.5), 0.06 + 0.11 * z + 0.01 * x)
     });
-    Ok(places.map(|at| placed(mesh.clone(), at)).collect())
-}
-
-/// The directions of the walls of the box, into it.
-const WALLS: [[f64; 2]; 4] = [[1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-
-/// Cubes on each other.
-fn stack(count: u32) -> SimulationBuilder {
-    let mut builder = Simulation::builder();
-    builder
-        .gravity(DVec3::NEG_Z * 9.81)
-        .ground(0.0, 0.5)
-        .solver(solver(60));
-    for cube in cubes(count) {
-        builder.add_body(Body::new(cube).young_modulus(2e7).damping(0.005));
-    }
-    builder.contact(ContactSpec::default().with(|spec| spec.friction = 0.5));
-    builder
-}
-
-/// The organs fall into the box.
-fn pile(tets: usize) -> anyhow::Result<SimulationBuilder> {
-    let mut builder = Simulation::builder();
-    builder
-        .gravity(DVec3::NEG_Z * 9.81)
-        .ground(0.0, 0.5)
-        .solver(solver(SUBSTEPS));
-    for organ in organs(tets)? {
-        builder.add_body(
-            Body::new(organ)
-                .young_modulus(2e4)
-                .density(1050.0)
-                .damping(0.005),
-        );
-    }
-    for [x, y] in WALLS {
-        let wall = ColliderSpec::plane([-0.11 * x, -0.11 * y, 0.0], [x, y, 0.0]);
-        builder.add_collider(wall.with_friction(0.2));
-    }
-    builder.contact(ContactSpec::default());
-    Ok(builder)
-}
-
-/// A stack or the pile for other systems, and for this one.
-fn peer_scene(name: &str, quick: bool) -> anyhow::Result<(Scene, SimulationBuilder)> {
-    let mut scene = Scene {
-        name: String::new(),
-        bodies: Vec::new(),
-        planes: vec![Plane {
-            point: DVec3::ZERO,
-            normal: DVec3::Z,
-        }],
-        young_modulus: 2e7,
+    let walls = [DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y]
+        .map(|inwards| Plane::new(-0.11 * inwards, inwards, 0.2));
+    let mut planes = vec![Plane::new(DVec3::ZERO, DVec3::Z, 0.5)];
+    planes.extend(walls);
+    Ok(Scene {
+        name: "eight organs in a box".to_owned(),
+        bodies: places.map(|at| placed(mesh.clone(), at)).collect(),
+        planes,
+        young_modulus: 2e4,
         poisson_ratio: BodySpec::default().poisson_ratio,
-        density: BodySpec::default().density,
-        friction: 0.5,
+        density: 1050.0,
+        damping: 0.005,
+        friction: ContactSpec::default().friction,
         gravity: DVec3::NEG_Z * 9.81,
-        time_step: 1.0 / 60.0,
-        substeps: 60,
-        frames: 0,
-    };
-    if let Some(count) = name.strip_prefix("stack-") {
-        let count = count.parse()?;
-        scene.name = format!("stack of {count} cubes");
-        scene.bodies = cubes(count).collect();
-        scene.frames = if quick { 8 } else { 90 + 20 * count };
-        return Ok((scene, stack(count)));
-    }
-    let tets = if quick { 200 } else { 1_000 };
-    scene.name = "eight organs in a box".to_owned();
-    scene.bodies = organs(tets)?;
-    scene.planes.extend(WALLS.map(|[x, y]| Plane {
-        point: dvec3(-0.11 * x, -0.11 * y, 0.0),
-        normal: dvec3(x, y, 0.0),
-    }));
-    (scene.young_modulus, scene.density) = (2e4, 1050.0);
-    (scene.friction, scene.substeps) = (0.0, SUBSTEPS);
-    scene.frames = if quick { 8 } else { 230 };
-    Ok((scene, pile(tets)?))
+        time_step: 0.016,
+        substeps: SUBSTEPS,
+        frames: if quick { 8 } else { 230 },
+        // Half a meter, five bodies.
+        farthest: 0.5 / peers::mean_edge(&mesh),
+    })
 }
+
+/// Frames at the end of a scene whose depth is that of rest; a quick scene has a third of its frames.
+const AT_REST: u32 = 30;
 
 /// Runs a scene and looks at its last frames.
-fn depth(name: &str, builder: SimulationBuilder, frames: [u32; 2]) -> anyhow::Result<Depth> {
-    let mut simulation = builder.build()?;
+fn depth(scene: &Scene) -> anyhow::Result<Depth> {
+    let mut simulation = scene.builder().build()?;
     let mut reports = Vec::new();
-    for _ in 0..frames[0] + frames[1] {
+    for _ in 0..scene.frames {
         reports.push(simulation.step()?.clone());
     }
-    let (before, last) = reports.split_at(frames[0] as usize);
+    let at_rest = AT_REST.min(scene.frames / 3);
+    let (before, last) = reports.split_at((scene.frames - at_rest) as usize);
     let most = |reports: &[FrameReport], of: fn(&incise::report::ContactReport) -> f64| {
         let contacts = reports.iter().filter_map(|report| report.contact);
         contacts.map(|contact| of(&contact)).fold(0.0, f64::max)
     };
     let end = simulation.report().contact.unwrap_or_default();
     Ok(Depth {
-        scene: name.to_owned(),
+        scene: scene.name.clone(),
         tets: simulation.mesh().tets.len(),
         active: end.active,
         depths: [most(last, |c| c.max_depth), most(last, |c| c.depth_p99)],
