@@ -137,9 +137,9 @@ fn gently() -> StepSettings {
     }
 }
 
-/// How far hosts come to be apart from one whose particles start off by up to a unit in the last place of 1, as those of a
-/// device that rounds in its own way: contacts at random places have no plane, or two of equal depth, so that rounding
-/// decides which one acts.
+/// Copies of a solver whose free particles are off by up to two units in the last place of 1. How far these come apart
+/// shows what the rounding of a device may change: contacts at random places have no plane, or two of equal depth, so that
+/// rounding decides which one acts.
 fn with_rounding(host: &Solver<f32>) -> impl Iterator<Item = Solver<f32>> {
     (0..12).map(|number| {
         let mut solver = host.clone();
