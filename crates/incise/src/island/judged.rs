@@ -286,7 +286,7 @@ impl Island {
         if self.keep_budget() {
             return;
         }
-        let fraction = self.judged.outside.outside / self.cuttable.mesh().total_volume();
+        let fraction = self.judged.outside.outside / self.volume();
         if self.spec.method != Method::GaussSeidel
             || fraction <= OUTSIDE_FRACTION
             || self.judged.outside.outside <= 2.0 * self.judged.outside.at_choice
@@ -322,7 +322,7 @@ impl Island {
             self.judge_settings();
         }
         self.judged.outside.at_choice = self.judged.outside.outside;
-        let fraction = self.judged.outside.outside / self.cuttable.mesh().total_volume();
+        let fraction = self.judged.outside.outside / self.volume();
         if fraction > OUTSIDE_FRACTION {
             let message = format!(
                 "after cuts {:.1}% of the volume is in tets too small for the accuracy wanted with {} substeps",
