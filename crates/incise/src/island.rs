@@ -7,6 +7,7 @@ mod join;
 mod judged;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use glam::DVec3;
 use incise_cutting::{
@@ -121,6 +122,44 @@ const IMPROVED_PART: usize = 8;
 /// The part of a body's size that a particle may start inside of a collider without a warning.
 const STARTING_DEPTH: f64 = 0.01;
 
+/// Bodies with their particles, which are consecutive.
+fn bodies(joined: &IslandBuilder) -> impl Iterator<Item = (usize, Range<usize>)> {
+    let mut end = 0;
+    let of_bodies = joined.body_of_particle.chunk_by(|a, b| a == b);
+    of_bodies.map(move |of_body| {
+        let first = end;
+        end += of_body.len();
+        (of_body[0] as usize, first..end)
+    })
+}
+
+/// The pressure of its own weight, in Young's moduli, that a body bears without a warning. Soft tissue has about 1.
+const LARGEST_WEIGHT: f64 = 10.0;
+
+/// The warnings about bodies that collapse under their weight, mostly because lengths are not in m. O(particles).
+fn too_heavy(
+    scene: &Scene,
+    settings: &StepSettings,
+    joined: &IslandBuilder,
+    mesh: &TetMesh,
+) -> Vec<Warning> {
+    let Some(gravity) = settings.gravity else {
+        return Vec::new();
+    };
+    let warning = |(body, particles): (usize, Range<usize>)| {
+        let spec = &scene.body[body];
+        let positions = &mesh.positions[particles.clone()];
+        let size = Bounds::around(positions.iter().copied()).size();
+        let parts = spec.material.iter().filter_map(|part| part.young_modulus);
+        let stiffest = parts.fold(spec.young_modulus, f64::max);
+        let weight = spec.density * gravity.abs().dot(size) / stiffest;
+        let moves = joined.fixed[particles].iter().any(|fixed| !fixed);
+        (moves && weight > LARGEST_WEIGHT)
+            .then(|| Warning::of_weight(body, size.max_element(), weight))
+    };
+    bodies(joined).filter_map(warning).collect()
+}
+
 /// The warnings about bodies that start inside of a collider. O(particles · colliders).
 fn starts_inside(
     scene: &Scene,
@@ -130,11 +169,7 @@ fn starts_inside(
 ) -> Vec<Warning> {
     let grounds = usize::from(scene.world.ground.is_some());
     let mut warnings = Vec::new();
-    let mut first = 0;
-    // The particles of a body are consecutive.
-    for of_body in joined.body_of_particle.chunk_by(|a, b| a == b) {
-        let particles = first..first + of_body.len();
-        first = particles.end;
+    for (body, particles) in bodies(joined) {
         let positions = &mesh.positions[particles.clone()];
         let size = Bounds::around(positions.iter().copied()).size();
         let is_free = joined.fixed[particles].iter().map(|fixed| !fixed);
@@ -150,7 +185,6 @@ fn starts_inside(
                     Some(number) => format!("collider[{number}]"),
                     None => "the ground".into(),
                 };
-                let body = of_body[0] as usize;
                 warnings.push(Warning::of_start_inside(body, depth, &name));
             }
         }
@@ -173,7 +207,8 @@ impl Island {
         let mut solver = joined.solver(precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
-        let overlaps = starts_inside(scene, &settings, &joined, cuttable.mesh());
+        let mut at_start = starts_inside(scene, &settings, &joined, cuttable.mesh());
+        at_start.extend(too_heavy(scene, &settings, &joined, cuttable.mesh()));
         let is_open = leaves_open(scene, &joined.substeps, &settings, compute_device.is_gpu());
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
@@ -237,7 +272,7 @@ impl Island {
         island
             .judged
             .warnings
-            .extend(empty.map(Warning::of_empty_region).chain(overlaps));
+            .extend(empty.map(Warning::of_empty_region).chain(at_start));
         Ok(island)
     }
 

@@ -42,6 +42,8 @@ pub enum WarningCode {
     EmptyRegion,
     /// A body starts inside the ground or a collider.
     StartsInside,
+    /// A body collapses under its own weight.
+    TooHeavy,
     /// The scene has a ground and says nothing about gravity, so nothing falls onto it.
     NoGravity,
     /// A stroke has ended without meeting a tet.
@@ -101,6 +103,16 @@ impl Warning {
             "it starts {depth} m inside {collider}, which pushes it out: move one of them by {depth} m"
         );
         Self::new(WarningCode::StartsInside, &[body], message)
+    }
+
+    /// The warning about a body of `size` m that the pressure of its weight, `weight` times its Young's modulus, crushes.
+    pub(crate) fn of_weight(body: usize, size: f64, weight: f64) -> Self {
+        let message = format!(
+            "it is {} m large, and the pressure of its weight is {weight:.0} times its Young's modulus, so it collapses: set \
+             scale = 0.001 if its lengths are in mm, or raise young_modulus",
+            rounded(size)
+        );
+        Self::new(WarningCode::TooHeavy, &[body], message)
     }
 
     /// The warning about a ground in a scene without gravity.

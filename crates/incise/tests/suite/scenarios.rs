@@ -238,6 +238,43 @@ fn bodies_that_start_inside_colliders_are_named_and_rise_slowly() {
     );
 }
 
+/// A body in mm without `scale` is a thousand times as large and collapses under its weight: it is named.
+#[test]
+fn a_body_that_its_weight_crushes_is_named() {
+    let text = |scale: f64, young_modulus: f64, world: &str, more: &str| {
+        format!(
+            "[world]\n{world}\n[[body]]\nshape = {{ kind = \"box\", tets = 200 }}\nscale = {scale}\nyoung_modulus = {young_modulus}\n{more}"
+        )
+    };
+    let fall = "gravity = [0.0, 0.0, -9.81]";
+    let all = "fixed = [{ half_space = { point = [0.0, 0.0, -1e3], normal = [0.0, 0.0, 1.0] } }]";
+    let stiff = "[[body.material]]\nyoung_modulus = 1e8\nregions = [{ half_space = { point = [0.0, 0.0, 0.0], normal = [0.0, 0.0, 1.0] } }]";
+    for (text, weight) in [
+        (text(200.0, 1e4, fall, ""), Some("196 times")),
+        (text(200.0, 1e6, fall, ""), None),
+        (text(0.2, 1e4, fall, ""), None),
+        (text(200.0, 1e4, "", ""), None),
+        (text(200.0, 1e4, fall, all), None),
+        (text(200.0, 1e4, fall, stiff), None),
+    ] {
+        let mut simulation = simulation(&scene(&text));
+        for frame in 0..2 {
+            let report = simulation.step().unwrap();
+            let is_named = |w: &&Warning| w.code == WarningCode::TooHeavy;
+            let warning = report.warnings().iter().find(is_named);
+            match (weight, frame) {
+                (Some(weight), 0) => {
+                    let warning = warning.unwrap_or_else(|| panic!("no warning: {text}"));
+                    assert_eq!(warning.location, "body 0");
+                    assert!(warning.message.contains(weight), "{warning}");
+                    assert!(warning.message.contains("200 m large"), "{warning}");
+                }
+                _ => assert!(warning.is_none(), "{text}, frame {frame}"),
+            }
+        }
+    }
+}
+
 /// Nothing falls without gravity, which a newcomer with a ground does not expect; one who asks for none does.
 #[test]
 fn a_ground_without_gravity_is_named_once() {
