@@ -119,9 +119,6 @@ const IMPROVED_TETS: usize = 1000;
 /// The improvement of a frame looks at one of so many tets of a larger island: a quarter of the time of 20 iterations.
 const IMPROVED_PART: usize = 8;
 
-/// The part of a body's size that a particle may start inside of a collider without a warning.
-const STARTING_DEPTH: f64 = 0.01;
-
 /// Bodies with their particles, which are consecutive.
 fn bodies(joined: &IslandBuilder) -> impl Iterator<Item = (usize, Range<usize>)> {
     let mut end = 0;
@@ -159,6 +156,9 @@ fn too_heavy(
     };
     bodies(joined).filter_map(warning).collect()
 }
+
+/// The part of a body's size that a particle may start inside of a collider without a warning.
+const STARTING_DEPTH: f64 = 0.01;
 
 /// The warnings about bodies that start inside of a collider. O(particles · colliders).
 fn starts_inside(
