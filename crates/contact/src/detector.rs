@@ -330,15 +330,16 @@ impl ContactDetector {
         &self.settings
     }
 
-    /// Follows a cut or a removal; `mesh` is the one after it. New particles belong to the bodies of those they were made
+    /// Applies the delta of a cut or a removal; `mesh` is the one after it. New particles belong to the bodies of those they were made
     /// of. Costs what the boundary lost and gained; the next update searches.
     ///
     /// # Panics
     /// If the delta does not follow the last one.
     pub fn apply_delta(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
         let change = &mut self.room.change;
-        self.surface.follow(mesh, delta, change);
-        self.fresh_pairs.follow(mesh, &self.surface, delta, change);
+        self.surface.apply_delta_into(mesh, delta, change);
+        self.fresh_pairs
+            .apply_delta(mesh, &self.surface, delta, change);
         for point in &delta.points {
             self.body_of.push(self.body_of[point.ends[0].index()]);
         }
@@ -370,9 +371,9 @@ impl ContactDetector {
     /// If the delta was not the last one.
     pub fn undo(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
         let change = &mut self.room.change;
-        self.surface.follow_back(mesh, delta, change);
+        self.surface.undo_delta(mesh, delta, change);
         self.fresh_pairs
-            .follow_back(mesh, &self.surface, delta, change);
+            .undo_delta(mesh, &self.surface, delta, change);
         self.body_of.truncate(delta.particles_before);
         let before = |tet: TetId| {
             let moved = delta.moved.binary_search_by_key(&tet, |moved| moved.to);
@@ -414,7 +415,7 @@ impl ContactDetector {
             particles,
             "a velocity for each particle"
         );
-        assert_eq!(self.body_of.len(), particles, "all deltas were followed");
+        assert_eq!(self.body_of.len(), particles, "all deltas were applied");
 
         if self.search_is_due {
             self.list_vertices(state);

@@ -23,6 +23,6 @@ pub enum ContactError {
         particles: usize,
     },
     /// The state is not the one that the mesh asks for: a delta was left out, or there is a defect in this crate.
-    #[error("the contact state does not follow its mesh: {0}")]
+    #[error("the contact state does not match its mesh: {0}")]
     Differs(String),
 }

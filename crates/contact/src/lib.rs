@@ -1,6 +1,6 @@
 //! Contact between deforming bodies of tetrahedra, their pieces and the sides of cuts, found while they are cut.
 //!
-//! A [`ContactDetector`] follows each [`incise_cutting::CutDelta`] and lists, once a frame, what may touch:
+//! A [`ContactDetector`] applies each [`incise_cutting::CutDelta`] and lists, once a frame, what may touch:
 //!
 //! - [`PairContact`]: two particles that were one before a cut. They start at a gap of exactly 0, need no search and
 //!   hold the sides of a cut apart from its first frame on ([`FreshPairs`]).

@@ -135,8 +135,8 @@ impl FreshPairs {
         *self = Self::default();
     }
 
-    /// Follows what a delta did to the surface.
-    pub(crate) fn follow(
+    /// Applies what a delta did to the surface.
+    pub(crate) fn apply_delta(
         &mut self,
         mesh: &CuttableMesh,
         surface: &ContactSurface,
@@ -222,8 +222,8 @@ impl FreshPairs {
         }
     }
 
-    /// Follows what taking a delta back did to the surface.
-    pub(crate) fn follow_back(
+    /// Applies what undoing a delta did to the surface.
+    pub(crate) fn undo_delta(
         &mut self,
         mesh: &CuttableMesh,
         surface: &ContactSurface,

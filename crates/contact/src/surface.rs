@@ -1,4 +1,4 @@
-//! [`ContactSurface`]: the boundary triangles of a mesh with their fans around each vertex, following cuts.
+//! [`ContactSurface`]: the boundary triangles of a mesh with their fans around each vertex, updated by the delta of each cut.
 //!
 //! Triangles live in slots: a removed one leaves its slot empty, new ones are appended, so that a search tree built over
 //! the slots stays valid through a cut. [`ContactSurface::compact`] drops the empty ones now and then. The fan of a
@@ -26,7 +26,7 @@ pub(crate) struct SurfaceChange {
     pub(crate) first_added: u32,
 }
 
-/// The boundary of a mesh, following cuts.
+/// The boundary of a mesh, updated by the delta of each cut.
 ///
 /// # Example
 /// ```
@@ -96,16 +96,17 @@ impl ContactSurface {
         }
     }
 
-    /// Follows a cut or a removal. `mesh` is the one after it. Costs what the boundary lost and gained.
+    /// Applies the delta of a cut or a removal. `mesh` is the one after it. Costs what the boundary lost and gained.
     ///
     /// # Panics
     /// If the delta does not follow the last one.
     pub fn apply_delta(&mut self, mesh: &CuttableMesh, delta: &CutDelta) {
         let mut change = SurfaceChange::default();
-        self.follow(mesh, delta, &mut change);
+        self.apply_delta_into(mesh, delta, &mut change);
     }
 
-    pub(crate) fn follow(
+    /// Applies a delta and notes the slots that it removed and added.
+    pub(crate) fn apply_delta_into(
         &mut self,
         mesh: &CuttableMesh,
         delta: &CutDelta,
@@ -132,7 +133,7 @@ impl ContactSurface {
     }
 
     /// Takes a cut back. `mesh` is the one before it.
-    pub(crate) fn follow_back(
+    pub(crate) fn undo_delta(
         &mut self,
         mesh: &CuttableMesh,
         delta: &CutDelta,
