@@ -373,7 +373,7 @@ fn pile(quick: bool) -> anyhow::Result<Scene> {
         time_step: 0.016,
         substeps: SUBSTEPS,
         frames: if quick { 8 } else { 230 },
-        // Half a meter, five bodies.
+        // Half a meter, five times the size of a body.
         farthest: 0.5 / peers::mean_edge(&mesh),
     })
 }

@@ -330,8 +330,8 @@ impl ContactDetector {
         &self.settings
     }
 
-    /// Applies the delta of a cut or a removal; `mesh` is the one after it. New particles belong to the bodies of those they were made
-    /// of. Costs what the boundary lost and gained; the next update searches.
+    /// Applies the delta of a cut or a removal; `mesh` is the one after it. New particles belong to the bodies of those they
+    /// were made of. Costs what the boundary lost and gained; the next update searches.
     ///
     /// # Panics
     /// If the delta does not follow the last one.
