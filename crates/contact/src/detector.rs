@@ -429,10 +429,19 @@ impl ContactDetector {
             steps: &self.room.steps,
             ..near
         };
+        let (surface, mean_edge) = (&self.surface, self.mean_edge);
+        // A particle that was pushed through its own tet would be held on the wrong side.
+        let rests = |pair: [u32; 2]| {
+            let pair = pair.map(ParticleId);
+            are_of_one_piece(surface, state, pair)
+                && pair
+                    .iter()
+                    .any(|&p| is_pushed_through(surface, state, mean_edge, p))
+        };
         self.fresh_pairs.evaluate(
-            &self.surface,
+            surface,
             state.positions,
-            |[a, b], gap| near.of(&[a], &[b], gap),
+            |[a, b], gap| near.of(&[a], &[b], gap) && !rests([a, b]),
             |pair| retired.extend(pair),
             &mut self.pairs,
         );
@@ -493,7 +502,8 @@ impl ContactDetector {
         if !all {
             let mut look = |p: u32| due[p as usize] = due[p as usize].max(Due::Search);
             self.each_slid(state, &mut look);
-            let is_back = |p: &u32| !self.is_inverted(state, ParticleId(*p));
+            let is_back =
+                |p: &u32| !is_pushed_through(&self.surface, state, self.mean_edge, ParticleId(*p));
             let back = self.inverted.iter().filter(|p| is_back(p));
             back.chain(retired).copied().for_each(look);
         }
@@ -512,16 +522,6 @@ impl ContactDetector {
             self.reserve.mark();
         }
         asked
-    }
-
-    /// Whether a tet behind a triangle around a vertex is inverted.
-    fn is_inverted(&self, state: &ContactState<'_>, vertex: ParticleId) -> bool {
-        let tets = &state.mesh.mesh().tets;
-        let mut fan = self.surface.fan(vertex);
-        fan.any(|triangle| {
-            let corners = tets[triangle.tet.index()].map(|p| state.positions[p.index()]);
-            is_inverted(corners, self.mean_edge)
-        })
     }
 
     /// Notes the vertices that have moved out of their reserve, which starts over for them; whether all are due.
@@ -1292,6 +1292,31 @@ fn fit(
     }
     let motions = parts.iter_mut().flat_map(|part| &mut part.motions);
     motions.for_each(Motion::fit);
+}
+
+/// Whether two surface vertices are of the same piece.
+fn are_of_one_piece(
+    surface: &ContactSurface,
+    state: &ContactState<'_>,
+    vertices: [ParticleId; 2],
+) -> bool {
+    let piece = |p| Some(state.pieces.piece_of(surface.fan(p).next()?.tet));
+    let [one, other] = vertices.map(piece);
+    one == other
+}
+
+/// Whether a tet behind a triangle around a vertex is inverted.
+fn is_pushed_through(
+    surface: &ContactSurface,
+    state: &ContactState<'_>,
+    mean_edge: f64,
+    vertex: ParticleId,
+) -> bool {
+    let tets = &state.mesh.mesh().tets;
+    surface.fan(vertex).any(|triangle| {
+        let corners = tets[triangle.tet.index()].map(|p| state.positions[p.index()]);
+        is_inverted(corners, mean_edge)
+    })
 }
 
 /// Whether a tet is inverted by more than rounding turns a sliver over.

@@ -11,10 +11,11 @@
 //! normal is no difference of positions, so it is well defined at a gap of exactly 0, which each cut starts with.
 //!
 //! Where cuts cross, a particle has several copies; only those that share twins are paired, never all with all. A cut
-//! that splits both sides of an earlier one at the same places leaves parts that are twins again. A pair
-//! ends when the sides have slid apart by a quarter of an edge (or half the way out of the triangles around it), when they fold, or when a later cut took its
-//! faces. It does not come back: from then on the search takes care of both particles. A pair whose sides the frame does
-//! not bring together sleeps: it is left out of the list, and is there again when they come close.
+//! that splits both sides of an earlier one at the same places leaves parts that are twins again. A pair ends when the
+//! sides have slid apart by a quarter of an edge (or half the way out of the triangles around it), when they fold, or when a
+//! later cut took its faces. It does not come back: from then on the search takes care of both particles. A pair whose
+//! sides the frame does not bring together sleeps: it is left out of the list, and is there again when they come close. So
+//! does a pair within a piece while a tet at one of its particles is inverted: it would hold that tet inverted.
 //!
 //! Cost: a delta costs what the boundary lost and gained; an update is a pass over the twins.
 
@@ -412,12 +413,12 @@ impl FreshPairs {
     }
 
     /// Ends the pairs that have slid apart or folded, for whose particles it calls `retire`, and lists the others that are
-    /// near each other by their particles and their gap, ascending by their numbers.
+    /// to be held by their particles and their gap, ascending by their numbers.
     pub(crate) fn evaluate(
         &mut self,
         surface: &ContactSurface,
         positions: &[DVec3],
-        is_near: impl Fn([u32; 2], f64) -> bool,
+        is_held: impl Fn([u32; 2], f64) -> bool,
         mut retire: impl FnMut([u32; 2]),
         list: &mut Vec<PairContact>,
     ) {
@@ -455,7 +456,7 @@ impl FreshPairs {
             if !holds {
                 pair.is_retired = true;
                 retire(pair.particles);
-            } else if is_near(pair.particles, gap) {
+            } else if is_held(pair.particles, gap) {
                 list.push(PairContact {
                     particles: pair.particles,
                     normal,
