@@ -3,7 +3,8 @@
 #
 #     crates/python/check.sh [INCISE]
 #
-# INCISE is the binary of the command line, whose results are compared. Without Python or a package index nothing is
+# INCISE is the binary of the command line, whose results are compared. INCISE_PYTHON_PROFILE is the profile of cargo that
+# the wheel is built with, by default `release`; `dev` takes less time to build. Without Python or a package index nothing is
 # checked, and the last line says so; with INCISE_REQUIRE_PYTHON=1 that is an error.
 
 set -euo pipefail
@@ -30,7 +31,7 @@ timeout 300 "$scratch/build/bin/pip" install -q "maturin>=1.9,<2" >"$scratch/log
     skip "maturin cannot be installed: $(tail -n 1 -- "$scratch/log")"
 
 echo "the wheel"
-"$scratch/build/bin/maturin" build --release --locked --manifest-path "$here/Cargo.toml" --out "$scratch/wheels"
+"$scratch/build/bin/maturin" build --profile "${INCISE_PYTHON_PROFILE:-release}" --locked --manifest-path "$here/Cargo.toml" --out "$scratch/wheels"
 files=$(python3 -m zipfile -l "$scratch"/wheels/*.whl)
 for file in incise/__init__.pyi incise/py.typed LICENSE-MIT LICENSE-APACHE; do
     [[ $files == *$file* ]] || { echo "the wheel lacks $file" >&2; exit 1; }
