@@ -24,6 +24,12 @@ pub(super) fn in_scene_words(message: &str) -> String {
             return unknown_name(unknown, &names.collect::<Vec<_>>());
         }
     }
+    if message.starts_with("wanted exactly 1 element") {
+        // Only a region is a table of one key.
+        return "expected a table with one key, the kind of a region, and its values behind it, as in { sphere = { center = \
+                [0, 0, 0], radius = 0.1 } }"
+            .to_owned();
+    }
     if let Some(field) = message.strip_prefix("missing field ") {
         return format!("the key {} is missing", field.replace('`', "'"));
     }
@@ -101,6 +107,23 @@ mod tests {
 
     fn message(text: &str) -> String {
         Scene::from_toml(text).unwrap_err().to_string()
+    }
+
+    /// Shapes and colliders name their kind by a key, regions are one.
+    #[test]
+    fn a_region_without_its_kind() {
+        for region in [
+            "{ kind = \"box\", low = [0, 0, 0], high = [1, 1, 1] }",
+            "{}",
+        ] {
+            let given = message(&format!("[[body]]\nfixed = [{region}]"));
+            assert!(
+                given.starts_with("line 2: expected a table with one key"),
+                "{given}"
+            );
+            let (_, example) = given.split_once("as in ").unwrap();
+            Scene::from_toml(&format!("[[body]]\nfixed = [{example}]")).unwrap();
+        }
     }
 
     #[test]
