@@ -177,8 +177,10 @@ impl Motion {
 pub(crate) struct Part {
     pub(crate) body: u32,
     pub(crate) vertices: u32,
-    /// How many of them were looked at, while they are.
-    pub(crate) seen: u32,
+    /// The motion is fitted to one of so many of them.
+    pub(crate) stride: u32,
+    /// How many were looked at since the last one of these, while they are.
+    pub(crate) skipped: u32,
     /// Whether another part that it may touch is near.
     pub(crate) is_near: bool,
     /// Around what its vertices go in the frame.
@@ -192,7 +194,8 @@ impl Part {
     pub(crate) const EMPTY: Self = Self {
         body: NONE,
         vertices: 0,
-        seen: 0,
+        stride: 1,
+        skipped: 0,
         is_near: false,
         steps: Bounds::EMPTY,
         motions: [Motion::NONE; 2],
@@ -204,7 +207,11 @@ impl Part {
 
     /// What a vertex has moved by beside the part, at present and at the end of the frame.
     pub(crate) fn rests(&self, places: [DVec3; 2], moved: [DVec3; 2]) -> [DVec3; 2] {
-        [0, 1].map(|k| moved[k] - self.motions[k].of(places[k]))
+        let [present, expected] = &self.motions;
+        [
+            moved[0] - present.of(places[0]),
+            moved[1] - expected.of(places[1]),
+        ]
     }
 
     /// A bound on how much closer the frame brings any two points of two parts.

@@ -45,7 +45,7 @@ fn detect(island: &Island, solver: &mut AnySolver) -> Result<f64, Error> {
         // Bodies that move are searched for in nearly all frames.
         contacts.search_again();
         contacts.begin_frame(solver, cuttable, pieces, time, settings.substeps);
-        contacts.update(solver, cuttable, pieces, time)?;
+        contacts.update(solver, cuttable, pieces, 0, time)?;
         if frame > 0 {
             fastest = fastest.min(contacts.take_milliseconds());
         }

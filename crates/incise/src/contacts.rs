@@ -315,24 +315,25 @@ impl Contacts {
             ..
         } = &mut self.room;
         let solver = solver.host();
-        let particles = 0..solver.particle_count();
         solver.positions(positions);
-        velocities.clear();
-        velocities.extend(particles.clone().map(|p| solver.velocity(p)));
-        fixed.clear();
-        fixed.extend(particles.map(|p| !solver.is_free(p)));
+        solver.velocities(velocities);
+        solver.held(fixed);
     }
 
-    /// Finds what may touch in the next `time` s, and hands it to the solver.
+    /// Finds what may touch in a part of a frame, which takes `time` s, and hands it to the solver. Part 0 begins with the
+    /// state that [`Self::begin_frame`] has read.
     pub(crate) fn update(
         &mut self,
         solver: &mut AnySolver,
         mesh: &CuttableMesh,
         pieces: &PieceTracker,
+        part: u32,
         time: f64,
     ) -> Result<(), Error> {
         let start = Instant::now();
-        self.read(solver);
+        if part > 0 {
+            self.read(solver);
+        }
         let update = self.detector.update(&self.room.state(mesh, pieces, time));
         let particles = self.room.positions.len();
         let pairs = self.detector.pairs();

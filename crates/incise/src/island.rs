@@ -391,7 +391,7 @@ impl Island {
             u32::try_from(end).unwrap_or(substeps)
         };
         for part in 0..parts {
-            contacts.update(solver, cuttable, pieces, time / f64::from(parts))?;
+            contacts.update(solver, cuttable, pieces, part, time / f64::from(parts))?;
             let (schedule, range) = (&partition.schedule, end(part)..end(part + 1));
             let backend = solver.backend_mut();
             let step = backend.step(schedule, settings, range, keeping_residuals)?;

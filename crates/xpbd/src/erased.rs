@@ -60,9 +60,11 @@ erased! {
     fn position(&self, particle: usize) -> DVec3;
     fn positions(&self, out: &mut Vec<DVec3>);
     fn velocity(&self, particle: usize) -> DVec3;
+    fn velocities(&self, out: &mut Vec<DVec3>);
     fn mass(&self, particle: usize) -> f64;
     fn is_fixed(&self, particle: usize) -> bool;
     fn is_free(&self, particle: usize) -> bool;
+    fn held(&self, out: &mut Vec<bool>);
     fn tet_count(&self) -> usize;
     fn tet_particles(&self, tet: usize) -> [u32; 4];
     fn rest_volume(&self, tet: usize) -> f64;

@@ -629,13 +629,20 @@ fn when_a_search_is_due() {
     // Those of the two sides at least.
     assert!(scene.contacts.searched_vertices() >= 32);
     assert_eq!(scene.intervals(), 1);
-    for (speed, intervals) in [(0.5, 1), (1.0, 2), (3.0, 4), (30.0, 4)] {
-        for p in scene.particles_of(1) {
-            scene.velocities[p] =
-                DVec3::new(0.0, 0.0, -50.0 - speed * scene.contacts.mean_edge() / FRAME);
+    // Whether both fall or only one of them moves.
+    for fall in [50.0, 0.0] {
+        scene.velocities.fill(DVec3::new(0.0, 0.0, -fall));
+        for (speed, intervals) in [(0.1, 1), (0.5, 1), (1.0, 2), (3.0, 4), (30.0, 4)] {
+            for p in scene.particles_of(1) {
+                scene.velocities[p] =
+                    DVec3::new(0.0, 0.0, -fall - speed * scene.contacts.mean_edge() / FRAME);
+            }
+            assert_eq!(scene.intervals(), intervals);
         }
-        assert_eq!(scene.intervals(), intervals);
     }
+    // A velocity that is no number.
+    scene.velocities.fill(DVec3::NAN);
+    assert!(scene.intervals() >= 1);
 }
 
 /// Motion asks for a search only where it may bring surfaces together.

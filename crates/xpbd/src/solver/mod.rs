@@ -510,6 +510,19 @@ impl<R: Float> Solver<R> {
         out.extend((0..self.particles.len()).map(|p| self.position(p)));
     }
 
+    /// Writes the velocities of all particles in m/s to `out`.
+    pub fn velocities(&self, out: &mut Vec<DVec3>) {
+        out.clear();
+        let velocities = self.particles.velocities.iter();
+        out.extend(velocities.map(|&v| R::to_dvec3(v)));
+    }
+
+    /// Writes to `out` for each particle whether no force moves it: the opposite of [`Solver::is_free`].
+    pub fn held(&self, out: &mut Vec<bool>) {
+        out.clear();
+        out.extend((0..self.particles.len()).map(|p| !self.is_free(p)));
+    }
+
     /// Returns the point in m that positions are kept relative to, in the solver's precision. [`crate::Solver::step`]
     /// moves it when the body has moved by more than twice its size.
     #[must_use]

@@ -1,7 +1,7 @@
 //! The edits that a cut consists of, each alone and together: nothing is lost.
 
 use glam::{DVec3, dvec3};
-use incise_xpbd::{Material, Real, Solver};
+use incise_xpbd::{Material, Pose, Real, Solver};
 
 use crate::body::{RUBBER, within};
 
@@ -185,4 +185,35 @@ fn a_replaced_tet_keeps_its_material() {
         (solver.volume().rest - (1.0 / 6.0 + 2.0 / 3.0)).abs(),
         1e-14,
     );
+}
+
+/// Lists of all particles are what the functions of one particle say: of a fixed one, an attached one, one without mass,
+/// and free ones.
+#[test]
+fn lists_of_all_particles() {
+    fn check<R: Real>() {
+        let mut solver = Solver::<R>::new(&REST);
+        for p in 0..REST.len() {
+            let number = f64::from(u8::try_from(p).unwrap());
+            solver.set_mass(p, f64::from(u8::from(p != 2)));
+            solver.set_velocity(p, dvec3(0.1, -number, 2.0 * number));
+        }
+        solver.set_fixed(0, true);
+        let handle = solver.add_handle(Pose::at(DVec3::ZERO));
+        solver.attach(1, handle, 0.0, 0.0).unwrap();
+        let (mut positions, mut velocities, mut held) = (vec![DVec3::NAN], Vec::new(), vec![true]);
+        solver.positions(&mut positions);
+        solver.velocities(&mut velocities);
+        solver.held(&mut held);
+        let each = 0..solver.particle_count();
+        let one_by_one: (Vec<_>, Vec<_>) = each
+            .clone()
+            .map(|p| (solver.position(p), solver.velocity(p)))
+            .unzip();
+        assert_eq!((positions, velocities), one_by_one);
+        assert_eq!(held, each.map(|p| !solver.is_free(p)).collect::<Vec<_>>());
+        assert_eq!(held, [true, true, true, false, false]);
+    }
+    check::<f32>();
+    check::<f64>();
 }
