@@ -606,7 +606,7 @@ impl ContactDetector {
         let skin = self.near_skin();
         let ahead = self.settings.reach * self.mean_edge + skin;
         let step = |p: u32| state.velocities[p as usize] * state.frame_time;
-        // Then no two vertices approach each other by more than `ahead`.
+        // If all are, no two vertices approach each other by more than `ahead`.
         let is_calm = |&p: &u32| 4.0 * step(p).length_squared() <= ahead * ahead;
         if self.vertices.iter().all(is_calm) {
             return 1;
