@@ -1290,11 +1290,10 @@ fn fit(
         let step = places[1] - places[0];
         part.steps = part.steps.union(Bounds::around([step]));
         let is_fitted = part.skipped == 0;
-        part.skipped = if part.skipped + 1 == part.stride {
-            0
-        } else {
-            part.skipped + 1
-        };
+        part.skipped += 1;
+        if part.skipped == part.stride {
+            part.skipped = 0;
+        }
         for (motion, (x, by)) in part.motions.iter_mut().zip(places.into_iter().zip(moved)) {
             motion.cover(x);
             if is_fitted {
