@@ -23,7 +23,7 @@
 //! the run fails.
 
 use std::path::PathBuf;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
@@ -76,6 +76,9 @@ const MOST_GAINED: f64 = 1e-3;
 /// By how many times more iterations a frame that gains energy is computed again; the last time without recovery from depth.
 const AGAIN: [u32; 3] = [8, 100, 100];
 
+/// How often a run says how far it has come.
+const NEWS: Duration = Duration::from_secs(60);
+
 /// Recovery time in s that leaves depth as it is.
 const NO_RECOVERY: f64 = 1e3;
 
@@ -111,6 +114,24 @@ struct Tally {
     /// The deepest contact in mean edges.
     deepest: f64,
     repaired: usize,
+}
+
+impl Tally {
+    /// Says how far the run has come.
+    #[expect(clippy::print_stderr, reason = "a run takes an hour")]
+    fn tell(&self, mesh: &str, arguments: &StressArguments) {
+        let (made, all) = (self.strokes, arguments.strokes);
+        let (bodies, pieces) = (self.bodies, self.most_pieces);
+        eprint!("{mesh}: {made} of {all} strokes, {bodies} bodies, at most {pieces} pieces");
+        if arguments.contact || arguments.energy {
+            let (frames, most) = (self.gaining, self.most_gained);
+            let without_slivers = self.most_gained_without_slivers;
+            eprint!(
+                "; {frames} frames gained too much energy, at most {most:.1e}, without slivers {without_slivers:.1e}"
+            );
+        }
+        eprintln!();
+    }
 }
 
 #[expect(
@@ -210,6 +231,7 @@ fn stress_one(
         least_ratio: 1.0,
         ..Tally::default()
     };
+    let mut told = Instant::now();
     while tally.strokes < arguments.strokes && !late() {
         tally.bodies += 1;
         let mut scene = scene(model, arguments.plain, &mut random);
@@ -253,6 +275,10 @@ fn stress_one(
                 }
             }
             last = Some(stroke);
+            if told.elapsed() >= NEWS {
+                told = Instant::now();
+                tally.tell(&model.name, arguments);
+            }
         }
     }
     Ok(tally)
