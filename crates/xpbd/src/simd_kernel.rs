@@ -217,13 +217,6 @@ struct Energies<V, M> {
 type EnergiesOf<R, S> =
     Energies<<R as Float>::Lanes<S>, <<R as Float>::Lanes<S> as SimdBase<S>>::Mask>;
 
-/// What [`move_corners`] is called with, without positions.
-struct Offer<R: Float, S: Simd> {
-    weights: [R::Lanes<S>; 4],
-    change: Matrix<R::Lanes<S>>,
-    gradients: Matrix<R::Lanes<S>>,
-}
-
 /// The tets of one block.
 struct Tets<'a, R: Float, S: Simd> {
     simd: S,
@@ -266,17 +259,17 @@ fn solve_block<R: Float, S: Simd>(
                 tets.split(&x, &q, corners, keeps.then_some(&mut multipliers))
             };
             move_corners::<R, S>(&mut x, &change, &q);
-            refuse::<R, S>(pass, block, &x, &change, &q);
+            tets.refuse(pass, block, &x, &change);
         }
         TetSolve::Block => {
             let change = tets.both(&f, &mut multipliers);
             move_corners::<R, S>(&mut x, &change, &q);
-            refuse::<R, S>(pass, block, &x, &change, &q);
+            tets.refuse(pass, block, &x, &change);
         }
         TetSolve::Sequential => {
             let change = tets.deviatoric(&f, &mut multipliers[0]);
             move_corners::<R, S>(&mut x, &change, &q);
-            refuse::<R, S>(pass, block, &x, &change, &q);
+            tets.refuse(pass, block, &x, &change);
             let f = if jacobi {
                 f
             } else {
@@ -284,7 +277,7 @@ fn solve_block<R: Float, S: Simd>(
             };
             let change = tets.hydrostatic(&f, &mut multipliers[1]);
             move_corners::<R, S>(&mut x, &change, &q);
-            refuse::<R, S>(pass, block, &x, &change, &q);
+            tets.refuse(pass, block, &x, &change);
         }
     }
     if keeps {
@@ -326,10 +319,10 @@ fn damp_block<R: Float, S: Simd>(
     let f = deformation::<R, S>(&x, &q);
     let change = tets.damped_volume(&f, &deformation::<R, S>(&v, &q));
     move_corners::<R, S>(&mut v, &change, &q);
-    refuse::<R, S>(pass, block, &v, &change, &q);
+    tets.refuse(pass, block, &v, &change);
     let change = tets.damped_shear(&f, &deformation::<R, S>(&v, &q));
     move_corners::<R, S>(&mut v, &change, &q);
-    refuse::<R, S>(pass, block, &v, &change, &q);
+    tets.refuse(pass, block, &v, &change);
     put::<R, S>(simd, &v, velocities);
 }
 
@@ -523,6 +516,67 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
             bulge,
             far,
         }
+    }
+
+    /// Keeps what [`move_corners`] does not move the corners of inverse mass 0 by, if that is asked for.
+    #[inline(always)]
+    fn refuse(
+        &self,
+        pass: &Pass<'_, R>,
+        block: usize,
+        x: &[[R::Lanes<S>; 4]; 4],
+        change: &Matrix<R::Lanes<S>>,
+    ) {
+        if pass.refused.is_empty() {
+            return;
+        }
+        let zero = self.splat(R::ZERO);
+        let weights = [x[0][3], x[1][3], x[2][3], x[3][3]];
+        let [a, b, c, d] = weights;
+        let are_free = a.simd_gt(zero) & b.simd_gt(zero) & c.simd_gt(zero) & d.simd_gt(zero);
+        // Few blocks have a corner that is held.
+        if !are_free.all_true() {
+            self.keep_refused(pass, block, &weights, change);
+        }
+    }
+
+    /// Called with copies, so that a pass that keeps nothing has its registers.
+    #[inline(never)]
+    fn keep_refused(
+        &self,
+        pass: &Pass<'_, R>,
+        block: usize,
+        weights: &[R::Lanes<S>; 4],
+        change: &Matrix<R::Lanes<S>>,
+    ) {
+        self.simd.vectorize(
+            #[inline(always)]
+            || {
+                let q = &self.gradients();
+                let mut offers = [q[0], q[0], q[1], q[2]];
+                for axis in 0..3 {
+                    let row = [change[0][axis], change[1][axis], change[2][axis]];
+                    for j in 0..3 {
+                        offers[j + 1][axis] = dot::<R, S>(&row, &q[j]);
+                    }
+                    offers[0][axis] = -(offers[1][axis] + offers[2][axis] + offers[3][axis]);
+                }
+                let lanes = R::Lanes::<S>::LEN;
+                let corners = pass.corners_of::<S>(block);
+                let active = pass.layout.blocks.active[block];
+                for lane in (0..lanes).filter(|lane| active & (1 << lane) != 0) {
+                    for k in 0..4 {
+                        if weights[k][lane] > R::ZERO {
+                            continue;
+                        }
+                        let [x, y, z] = &offers[k];
+                        let offered = R::vector(x[lane], y[lane], z[lane]);
+                        let corner = corners[k * lanes + R::row(lane, lanes)];
+                        add_to::<R>(&pass.refused[corner as usize], offered);
+                    }
+                }
+            },
+        );
     }
 
     /// The part of a step that is taken where all of it would raise the energy of a tet that is far from rest, else 1:
@@ -924,56 +978,6 @@ fn corner_changes<R: Float, S: Simd>(
         changes[3][axis] = x[3][3] * c;
     }
     changes
-}
-
-/// Keeps what [`move_corners`] does not move the corners of inverse mass 0 by, if that is asked for.
-#[inline(always)]
-fn refuse<R: Float, S: Simd>(
-    pass: &Pass<'_, R>,
-    block: usize,
-    x: &[[R::Lanes<S>; 4]; 4],
-    change: &Matrix<R::Lanes<S>>,
-    q: &Matrix<R::Lanes<S>>,
-) {
-    if !pass.refused.is_empty() {
-        let offer = Offer {
-            weights: [x[0][3], x[1][3], x[2][3], x[3][3]],
-            change: *change,
-            gradients: *q,
-        };
-        keep_refused(pass, block, &offer);
-    }
-}
-
-/// Compiled once and called with copies, so that a pass that keeps nothing has its registers.
-#[cold]
-#[inline(never)]
-fn keep_refused<R: Float, S: Simd>(pass: &Pass<'_, R>, block: usize, offer: &Offer<R, S>) {
-    let lanes = R::Lanes::<S>::LEN;
-    let blocks = &pass.layout.blocks;
-    let corners = pass.corners_of::<S>(block);
-    for lane in 0..lanes {
-        let weights = [0, 1, 2, 3].map(|k| offer.weights[k][lane]);
-        let is_empty = blocks.active[block] & (1 << lane) == 0;
-        if is_empty || weights.iter().all(|weight| *weight > R::ZERO) {
-            continue;
-        }
-        let products = offer.gradients.map(|gradient| {
-            [0, 1, 2].map(|axis| {
-                offer.change[0][axis][lane] * gradient[0][lane]
-                    + offer.change[1][axis][lane] * gradient[1][lane]
-                    + offer.change[2][axis][lane] * gradient[2][lane]
-            })
-        });
-        let [a, b, c] = products.map(|[x, y, z]| R::vector(x, y, z));
-        let offers = [-(a + b + c), a, b, c];
-        for (k, offered) in offers.into_iter().enumerate() {
-            if weights[k] <= R::ZERO {
-                let corner = corners[k * lanes + R::row(lane, lanes)];
-                add_to::<R>(&pass.refused[corner as usize], offered);
-            }
-        }
-    }
 }
 
 #[inline(always)]

@@ -102,6 +102,30 @@ impl<R: Float> Solid<R> {
         }
     }
 
+    /// Whether a point is outside, which [`Solid::nearest`] then agrees with; false for some that are outside but near. Cheap.
+    #[inline]
+    pub(crate) fn clears(&self, x: R::Vector) -> bool {
+        match *self {
+            Self::Plane { normal, offset } => R::dot(normal, x) - offset >= R::ZERO,
+            Self::Round {
+                start,
+                axis,
+                per_squared,
+                radius,
+                ..
+            } => {
+                let part = clamp(R::dot(x - start, axis) * per_squared, R::ZERO, R::ONE);
+                let way = R::components(x - (start + axis * part));
+                // No vector is shorter than its largest component, also as `direction` computes it.
+                way.iter().any(|&c| absolute(c) > radius) && way.iter().all(|c| c.is_finite())
+            }
+            Self::Box { center, axes, half } => {
+                let way = x - center;
+                (0..3).any(|k| absolute(R::dot(axes[k], way)) > half[k])
+            }
+        }
+    }
+
     #[inline]
     pub(crate) fn nearest(&self, x: R::Vector) -> Nearest<R> {
         match *self {
@@ -216,5 +240,77 @@ impl Solid<f32> {
             }
         }
         numbers
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DQuat;
+
+    use super::*;
+
+    fn noise(number: u32) -> f64 {
+        (f64::from(number) * 12.9898).sin() * 43_758.545 % 1.0
+    }
+
+    fn vector(number: u32) -> DVec3 {
+        DVec3::from_array([0, 1, 2].map(|k| noise(3 * number + k)))
+    }
+
+    /// Points on and near surfaces of all sizes, and some that are no points; counts those outside that are cleared and
+    /// those that are not.
+    fn compare<R: Float>(scales: &[f64]) -> [u32; 2] {
+        let mut counts = [0; 2];
+        for number in 0..1000 {
+            let at = |k: u32| vector(7 * number + k);
+            let scale = scales[number as usize % scales.len()];
+            let (center, radius) = (at(0) * scale, scale * (0.1 + at(1).x.abs()));
+            let shapes = [
+                ColliderShape::Plane {
+                    point: center,
+                    normal: at(2),
+                },
+                ColliderShape::Sphere { center, radius },
+                ColliderShape::Capsule {
+                    ends: [center, center + at(2) * scale],
+                    radius,
+                },
+                ColliderShape::Box {
+                    center,
+                    half_extents: (at(1).abs() + 0.1) * scale,
+                    rotation: DQuat::from_vec4(at(3).extend(at(4).x)),
+                },
+            ];
+            for shape in shapes {
+                let solid = Solid::<R>::new(&shape);
+                let start = center + at(5) * (3.0 * scale);
+                let surface = solid.nearest(R::from_dvec3(start)).point;
+                let mut points = vec![R::from_dvec3(start), surface];
+                for by in [R::EPSILON, R::from_f64(1e-3)] {
+                    points.push(surface + surface * by);
+                    points.push(surface - surface * by);
+                }
+                let [x, y, _] = R::components(surface);
+                points.push(R::vector(x, y, R::from_f64(f64::INFINITY)));
+                points.push(R::vector(x, R::from_f64(f64::NAN), y));
+                for x in points {
+                    let is_outside = solid.nearest(x).distance >= R::ZERO;
+                    let clears = solid.clears(x);
+                    assert!(is_outside || !clears, "{shape:?} {x:?}");
+                    counts[usize::from(!clears)] += u32::from(is_outside);
+                }
+            }
+        }
+        counts
+    }
+
+    #[test]
+    fn what_is_cleared_is_outside() {
+        for [cleared, near] in [
+            compare::<f32>(&[1.0, 1e-6, 1e6, 1e-22, 1e18]),
+            compare::<f64>(&[1.0, 1e-6, 1e6, 1e-160, 1e150]),
+        ] {
+            assert!(cleared > near && near > 100, "{cleared} and {near}");
+        }
     }
 }
