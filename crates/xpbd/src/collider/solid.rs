@@ -103,7 +103,7 @@ impl<R: Float> Solid<R> {
     }
 
     /// Whether a point is outside, which [`Solid::nearest`] then agrees with; false for some that are outside but near. Cheap.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn clears(&self, x: R::Vector) -> bool {
         match *self {
             Self::Plane { normal, offset } => R::dot(normal, x) - offset >= R::ZERO,
@@ -124,6 +124,46 @@ impl<R: Float> Solid<R> {
                 (0..3).any(|k| absolute(R::dot(axes[k], way)) > half[k])
             }
         }
+    }
+
+    /// Whether all points of a box are outside, which [`Solid::nearest`] then agrees with; false for some that are. Cheap.
+    pub(crate) fn clears_box(&self, low: [R; 3], high: [R; 3]) -> bool {
+        let [own_low, own_high] = match *self {
+            Self::Plane { normal, offset } => {
+                // No corner is lower, also after rounding, which keeps the order of sums.
+                let n = R::components(normal);
+                let [x, y, z] = [0, 1, 2].map(|k| if n[k] < R::ZERO { high[k] } else { low[k] });
+                return R::dot(normal, R::vector(x, y, z)) - offset >= R::ZERO;
+            }
+            Self::Round {
+                start,
+                axis,
+                radius,
+                ..
+            } => {
+                let (start, end) = (R::components(start), R::components(start + axis));
+                let smaller = |a, b| if a < b { a } else { b };
+                let larger = |a, b| if a > b { a } else { b };
+                [
+                    [0, 1, 2].map(|k| smaller(start[k], end[k]) - radius),
+                    [0, 1, 2].map(|k| larger(start[k], end[k]) + radius),
+                ]
+            }
+            Self::Box { center, axes, half } => {
+                let center = R::components(center);
+                let axes = axes.map(R::components);
+                let reach = [0, 1, 2].map(|k| {
+                    let parts = [0, 1, 2].map(|i| absolute(axes[i][k]) * half[i]);
+                    parts[0] + parts[1] + parts[2]
+                });
+                [
+                    [0, 1, 2].map(|k| center[k] - reach[k]),
+                    [0, 1, 2].map(|k| center[k] + reach[k]),
+                ]
+            }
+        };
+        let rounding = self.reach() * R::EPSILON * R::from_f64(32.0);
+        (0..3).any(|k| low[k] > own_high[k] + rounding || high[k] < own_low[k] - rounding)
     }
 
     #[inline]
@@ -257,10 +297,10 @@ mod tests {
         DVec3::from_array([0, 1, 2].map(|k| noise(3 * number + k)))
     }
 
-    /// Points on and near surfaces of all sizes, and some that are no points; counts those outside that are cleared and
-    /// those that are not.
-    fn compare<R: Float>(scales: &[f64]) -> [u32; 2] {
-        let mut counts = [0; 2];
+    /// Points on and near surfaces of all sizes, some that are no points, and boxes that they are corners of; counts points
+    /// outside that are cleared and that are not, then the boxes of these.
+    fn compare<R: Float>(scales: &[f64]) -> [u32; 4] {
+        let mut counts = [0; 4];
         for number in 0..1000 {
             let at = |k: u32| vector(7 * number + k);
             let scale = scales[number as usize % scales.len()];
@@ -293,11 +333,21 @@ mod tests {
                 let [x, y, _] = R::components(surface);
                 points.push(R::vector(x, y, R::from_f64(f64::INFINITY)));
                 points.push(R::vector(x, R::from_f64(f64::NAN), y));
+                let size = R::from_dvec3(at(6).abs() * scale);
                 for x in points {
                     let is_outside = solid.nearest(x).distance >= R::ZERO;
                     let clears = solid.clears(x);
                     assert!(is_outside || !clears, "{shape:?} {x:?}");
                     counts[usize::from(!clears)] += u32::from(is_outside);
+                    if !R::components(x).iter().all(|c| c.is_finite()) {
+                        continue;
+                    }
+                    for ends in [[x, x], [x, x + size], [x - size, x]] {
+                        let [low, high] = ends.map(R::components);
+                        let clears = solid.clears_box(low, high);
+                        assert!(is_outside || !clears, "{shape:?} {x:?} {low:?} {high:?}");
+                        counts[2 + usize::from(!clears)] += u32::from(is_outside);
+                    }
                 }
             }
         }
@@ -306,11 +356,12 @@ mod tests {
 
     #[test]
     fn what_is_cleared_is_outside() {
-        for [cleared, near] in [
+        for [cleared, near, boxes, near_boxes] in [
             compare::<f32>(&[1.0, 1e-6, 1e6, 1e-22, 1e18]),
             compare::<f64>(&[1.0, 1e-6, 1e6, 1e-160, 1e150]),
         ] {
             assert!(cleared > near && near > 100, "{cleared} and {near}");
+            assert!(boxes > 1000 && near_boxes > 100, "{boxes} and {near_boxes}");
         }
     }
 }
