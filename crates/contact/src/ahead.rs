@@ -9,7 +9,7 @@
 
 use glam::{DVec3, Vec4};
 
-use crate::tree::{Around, Box32};
+use crate::tree::{Box32, Boxes, Children};
 
 /// What rounding to single precision adds to a coordinate and to a distance at most, as a part of it.
 const ROUNDING: f32 = 1e-6;
@@ -89,23 +89,41 @@ impl Lookout {
         self.still + if by <= self.limit { by } else { self.limit }
     }
 
-    /// Whether something in a box with these steps may be found.
+    /// The children of a node where something may be found, as bits.
     #[inline]
-    pub(crate) fn reaches(&self, bounds: &Box32, steps: &Box32) -> bool {
-        let apart = (bounds.low() - self.high)
-            .max(self.low - bounds.high())
-            .max(Vec4::ZERO);
-        let squared = apart.length_squared();
+    pub(crate) fn reached(&self, children: &Children) -> u32 {
+        let mut squared = Vec4::ZERO;
+        for k in 0..3 {
+            let apart = (children.bounds.low(k) - Vec4::splat(self.high[k]))
+                .max(Vec4::splat(self.low[k]) - children.bounds.high(k))
+                .max(Vec4::ZERO);
+            squared += apart * apart;
+        }
         // Most boxes are far away, and most others near.
-        let is_within = |reach: f32| squared <= reach * reach * (1.0 + ROUNDING);
-        is_within(self.still + self.limit)
-            && (is_within(self.still) || is_within(self.reach(steps)))
+        let within = |reach: Vec4| squared.cmple(reach * reach * (1.0 + ROUNDING)).bitmask();
+        let far = within(Vec4::splat(self.still + self.limit));
+        if far == 0 {
+            return 0;
+        }
+        let near = within(Vec4::splat(self.still));
+        if far == near {
+            return near;
+        }
+        near | far & within(self.reaches_of(&children.steps))
     }
 
-    /// Whether something below a node may be found.
+    /// A bound on how far apart something in each of four boxes with these steps may be to be found.
     #[inline]
-    pub(crate) fn reaches_node(&self, around: &Around) -> bool {
-        self.reaches(&around.bounds, &around.steps)
+    fn reaches_of(&self, steps: &Boxes) -> Vec4 {
+        let mut squared = Vec4::ZERO;
+        for k in 0..3 {
+            let by = (Vec4::splat(self.step_high[k]) - steps.low(k))
+                .max(steps.high(k) - Vec4::splat(self.step_low[k]));
+            squared += by * by;
+        }
+        let by = squared.sqrt() * (1.0 + ROUNDING);
+        let limit = Vec4::splat(self.limit);
+        self.still + Vec4::select(by.cmple(limit), by, limit)
     }
 }
 
@@ -164,7 +182,13 @@ mod tests {
             let lookout = Lookout::new(&of(x), &of(s), &reach);
             let further = |x: DVec3, k: u32| Bounds::around([x, x + 0.1 * scale * point(i ^ k)]);
             let (bounds, steps) = (further(y, 91), further(t, 92));
-            let is_reached = lookout.reaches(&Box32::around(&bounds), &Box32::around(&steps));
+            let mut children = Children::NONE;
+            let child = i as usize % 4;
+            children.bounds.set(child, &Box32::around(&bounds));
+            children.steps.set(child, &Box32::around(&steps));
+            let bits = lookout.reached(&children);
+            let is_reached = bits == 1 << child;
+            assert!(is_reached || bits == 0, "{i}: {bits}");
             if x.distance(y) <= reach.of(s.distance(t)) {
                 assert!(is_reached, "{i}");
                 reached += 1;
@@ -172,12 +196,11 @@ mod tests {
             left_out += u32::from(!is_reached);
         }
         assert!(reached > 100 && left_out > 1000, "{reached} and {left_out}");
-        let nothing = Box32::EMPTY;
         let reach = Reach {
             still: 1.0,
             limit: 1e9,
         };
         let lookout = Lookout::new(&Box32::POINT, &Box32::POINT, &reach);
-        assert!(!lookout.reaches(&nothing, &nothing));
+        assert_eq!(lookout.reached(&Children::NONE), 0);
     }
 }

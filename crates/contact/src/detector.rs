@@ -40,12 +40,12 @@ use crate::index::{NONE, index};
 use crate::normals::{Inversion, Owner, PlacedTriangle, Shape};
 use crate::pairs::{FreshPairs, PairContact};
 use crate::parts::{Motion, Part};
-use crate::query::{Found, Query, turn_away};
+use crate::query::{Found, Query, turned_away};
 use crate::reserve::Reserve;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
 use crate::surface::{ContactSurface, SurfaceChange};
-use crate::tree::{Around, Box32, Item, TriangleTree};
+use crate::tree::{Answers, Box32, Children, Item, TriangleTree};
 use crate::walk::Barycentric;
 
 /// New triangles as a fraction of those in the main tree beyond which that is built again.
@@ -899,17 +899,15 @@ impl ContactDetector {
                 continue;
             }
             let lookout = Lookout::new(&boxes[slot as usize], &triangle.steps, &reach);
-            let normal = Box32::at(triangle.normal.extend(0.0).as_vec4());
+            let normal = triangle.normal.extend(0.0).as_vec4();
             let (tet, piece) = (triangle.tet, triangle.owner.piece);
-            let is_wanted = |around: &Around| {
-                (lookout.reaches_node(around) && !turn_away(&around.normals, &normal))
-                    || around.bounds.overlaps(&tet)
+            let ask = |children: &Children| Answers {
+                first: lookout.reached(children) & !turned_away(&children.normals, normal),
+                second: children.bounds.overlapping(&tet),
             };
             for tree in [&self.main, &self.fresh] {
-                tree.search_where(is_wanted, |leaf| {
-                    let is_near = !turn_away(&Box32::at(leaf.normal), &normal)
-                        && lookout.reaches(&leaf.bounds, &leaf.steps);
-                    if is_near || (leaf.part != piece && leaf.bounds.overlaps(&tet)) {
+                tree.search_where(ask, |leaf, [is_near, overlaps]| {
+                    if is_near || (leaf.part != piece && overlaps) {
                         note(leaf.number);
                     }
                     true

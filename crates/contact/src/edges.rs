@@ -33,7 +33,7 @@ use crate::ahead::{Lookout, approach};
 use crate::index::index;
 use crate::query::{AS_AT_REST, Query};
 use crate::surface::ContactSurface;
-use crate::tree::{Box32, Item, Leaf, TriangleTree};
+use crate::tree::{Answers, Box32, Children, Item, Leaf, TriangleTree};
 
 /// The cosine of the angle by which the triangles of a feature edge turn at rest.
 const SHARP: f64 = 0.766;
@@ -346,8 +346,8 @@ fn look_around(
     let begin = found.len();
     let bounds = Box32::around(&Bounds::around(wedge.ends));
     let lookout = Lookout::new(&bounds, &steps_of(query, edge), &query.reach);
-    let visit = |leaf: &Leaf| {
-        if leaf.number as usize > first && lookout.reaches(&leaf.bounds, &leaf.steps) {
+    let visit = |leaf: &Leaf, _| {
+        if leaf.number as usize > first {
             let other = leaf.number as usize;
             if let Some(other_wedge) = &wedges[other] {
                 found.extend(contact(
@@ -360,7 +360,11 @@ fn look_around(
         }
         true
     };
-    tree.search_where(|around| lookout.reaches_node(around), visit);
+    let ask = |children: &Children| Answers {
+        first: lookout.reached(children),
+        second: 0,
+    };
+    tree.search_where(ask, visit);
     // Of those that have passed it before, all, however deep.
     let from = known.partition_point(|contact| contact.particles[..2] < edge.ends[..]);
     let known = known[from..].iter();

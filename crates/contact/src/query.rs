@@ -35,7 +35,7 @@ use crate::normals::{Inversion, Owner, Shape};
 use crate::pairs::FreshPairs;
 use crate::settings::ContactSettings;
 use crate::state::ContactState;
-use crate::tree::{Around, Box32, Leaf, TriangleTree};
+use crate::tree::{Answers, Box32, Boxes, Children, Leaf, TriangleTree};
 use crate::walk::{Barycentric, walk};
 
 /// Sides face each other where the dot product of their unit normals is below this.
@@ -217,20 +217,12 @@ impl VertexNormals {
             .normalize_or_zero()
     }
 
-    /// Whether a triangle does not face the vertex for sure, whatever rounding does; cheap.
+    /// Which of four boxes hold no normal of a triangle that faces the vertex, as bits.
     #[inline]
-    fn turn_away(&self, normal: Vec4) -> bool {
-        let mut normals = self.single[..self.count].iter();
-        self.count > 0 && normals.all(|n| n.dot(normal) >= FACING_SINGLE)
-    }
-
-    /// Whether no triangle faces the vertex whose normal is in a box.
-    #[inline]
-    fn all_turn_away(&self, normals: &Box32) -> bool {
-        let (low, high) = (normals.low(), normals.high());
-        let mut own = self.single[..self.count].iter();
-        // The least dot product with a vector of the box.
-        self.count > 0 && own.all(|&n| (n * low).min(n * high).element_sum() >= FACING_SINGLE)
+    fn turned_away(&self, normals: &Boxes) -> u32 {
+        let own = self.single[..self.count].iter();
+        let all = own.map(|normal| turned_away(normals, *normal));
+        all.reduce(|one, other| one & other).unwrap_or(0)
     }
 
     /// The least dot product with a normal: how little a triangle faces the vertex. A vertex without a normal, whose
@@ -243,14 +235,15 @@ impl VertexNormals {
     }
 }
 
-/// Whether no two unit normals in two boxes face each other, whatever rounding does.
+/// Which of four boxes hold no unit normal that faces another one, whatever rounding does, as bits.
 #[inline]
-pub(crate) fn turn_away(one: &Box32, other: &Box32) -> bool {
-    // The least dot product of two vectors in the boxes.
-    let (low, high) = (other.low(), other.high());
-    let at_low = (one.low() * low).min(one.low() * high);
-    let at_high = (one.high() * low).min(one.high() * high);
-    at_low.min(at_high).element_sum() >= FACING_SINGLE
+pub(crate) fn turned_away(normals: &Boxes, normal: Vec4) -> u32 {
+    // The least dot product with a vector of the box.
+    let mut least = Vec4::ZERO;
+    for k in 0..3 {
+        least += (normals.low(k) * normal[k]).min(normals.high(k) * normal[k]);
+    }
+    least.cmpge(Vec4::splat(FACING_SINGLE)).bitmask()
 }
 
 /// A dot product of unit vectors rounded to a millionth, so that triangles of one plane face a vertex alike.
@@ -450,20 +443,28 @@ impl Query<'_> {
         let normals = vertex.normals;
         let behind = Box32::around(&Bounds::around([vertex.behind]));
         // What is unsound has an empty box.
-        let is_wanted = |around: &Around| {
-            (lookout.reaches_node(around) && !normals.all_turn_away(&around.normals))
-                || around.tets.overlaps(&behind)
-        };
-        let mut look = |leaf: &Leaf| {
-            let beside = Beside {
-                is_near: !normals.turn_away(leaf.normal)
-                    && lookout.reaches(&leaf.bounds, &leaf.steps),
-                may_contain: leaf.tet.overlaps(&behind),
+        let ask = |children: &Children| {
+            let reached = lookout.reached(children);
+            let away = match reached {
+                0 => 0,
+                _ => normals.turned_away(&children.normals),
             };
-            !(beside.is_near || beside.may_contain) || visit(leaf, beside)
+            Answers {
+                first: reached & !away,
+                second: children.tets.overlapping(&behind),
+            }
+        };
+        let mut look = |leaf: &Leaf, [is_near, may_contain]: [bool; 2]| {
+            visit(
+                leaf,
+                Beside {
+                    is_near,
+                    may_contain,
+                },
+            )
         };
         let mut trees = self.trees.into_iter();
-        trees.all(|tree| tree.search_where(is_wanted, &mut look))
+        trees.all(|tree| tree.search_where(ask, &mut look))
     }
 
     /// How far away a triangle may be for a vertex.

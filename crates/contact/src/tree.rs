@@ -1,24 +1,27 @@
-//! [`TriangleTree`]: boxes of triangles in a binary tree that is refitted as they move.
+//! [`TriangleTree`]: boxes of triangles in a tree with four children a node that is refitted as they move.
 //!
 //! Built by halving at the median center along the longest axis, first among the pieces of bodies, so that boxes stay
-//! small while pieces pass each other, then among the triangles of each, four a leaf, nodes in the order of a walk
-//! with the node to skip to. A search needs no stack. Boxes are in single precision, rounded outward, so that half the
-//! memory is read and nothing is missed. Its results are a set: their order is the tree's own. What most searches look at
-//! of a triangle, its box and its normal, lies beside those of the others of its leaf. A node also has a box around the
-//! normals below it, so that a search may leave out whole patches that face the wrong way, and one around the steps of the
-//! frame, so that it looks further where something moves fast.
+//! small while pieces pass each other, then among the triangles of each; a node stands for two halvings and holds what is
+//! asked of its children side by side, so that a search asks four of them at once. Boxes are in single precision, rounded
+//! outward, so that half the memory is read and nothing is missed. Its results are a set: their order is the tree's own.
+//! Of a child a node has the box around the triangles below it, that around the tets behind them, one around their
+//! normals, so that a search may leave out whole patches that face the wrong way, and one around the steps of the frame,
+//! so that it looks further where something moves fast.
 //!
 //! Cost: O(n log n) to build, O(n) to refit, O(log n + found) a search.
 
 use std::ops::Range;
 
-use glam::{DVec3, Vec4};
+use glam::{BVec4A, DVec3, Vec4};
 use incise_mesh::Bounds;
 
 use crate::index::index;
 
-/// Triangles a leaf holds at most.
-const LEAF: usize = 4;
+/// The most children of a node.
+const CHILDREN: usize = 4;
+/// Nodes that wait to be looked at in a search at most: three more at each level of a tree over 2³² triangles in as many
+/// parts.
+const WAITING: usize = 3 * 32 + 1;
 
 /// A box in single precision around one in double precision; empty where `low` exceeds `high`. The last of four numbers is
 /// 0, so that a box is compared in lanes.
@@ -79,12 +82,6 @@ impl Box32 {
         Vec4::from_array(self.high)
     }
 
-    #[inline]
-    pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        let is_below = self.low().cmple(other.high());
-        (is_below & other.low().cmple(self.high())).all()
-    }
-
     fn longest_axis(&self) -> usize {
         let size = [0, 1, 2].map(|k| f64::from(self.high[k]) - f64::from(self.low[k]));
         DVec3::from_array(size).max_position()
@@ -120,35 +117,88 @@ fn rounded_up(x: f64) -> f32 {
     -rounded_down(-x)
 }
 
-/// What a node knows of all triangles below it.
+/// Four boxes side by side: coordinates by axis, then by box.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Around {
-    pub(crate) bounds: Box32,
-    /// Around the tets behind them.
-    pub(crate) tets: Box32,
-    /// Around their normals.
-    pub(crate) normals: Box32,
-    /// Around their steps.
-    pub(crate) steps: Box32,
+pub(crate) struct Boxes {
+    low: [[f32; CHILDREN]; 3],
+    high: [[f32; CHILDREN]; 3],
 }
 
-impl Around {
-    const NOTHING: Self = Self {
-        bounds: Box32::EMPTY,
-        tets: Box32::EMPTY,
-        normals: Box32::EMPTY,
-        steps: Box32::EMPTY,
+impl Boxes {
+    const EMPTY: Self = Self {
+        low: [[f32::MAX; CHILDREN]; 3],
+        high: [[f32::MIN; CHILDREN]; 3],
     };
 
-    fn union(self, other: Self) -> Self {
-        Self {
-            bounds: self.bounds.union(other.bounds),
-            tets: self.tets.union(other.tets),
-            normals: self.normals.union(other.normals),
-            steps: self.steps.union(other.steps),
+    #[inline]
+    pub(crate) fn set(&mut self, child: usize, one: &Box32) {
+        for k in 0..3 {
+            self.low[k][child] = one.low[k];
+            self.high[k][child] = one.high[k];
         }
     }
+
+    /// The box around all of them.
+    #[inline]
+    fn all(&self) -> Box32 {
+        let mut all = Box32::EMPTY;
+        for k in 0..3 {
+            all.low[k] = self.low(k).min_element();
+            all.high[k] = self.high(k).max_element();
+        }
+        all
+    }
+
+    #[inline]
+    pub(crate) fn low(&self, axis: usize) -> Vec4 {
+        Vec4::from_array(self.low[axis])
+    }
+
+    #[inline]
+    pub(crate) fn high(&self, axis: usize) -> Vec4 {
+        Vec4::from_array(self.high[axis])
+    }
+
+    /// Which of them overlap a box, as bits.
+    #[inline]
+    pub(crate) fn overlapping(&self, other: &Box32) -> u32 {
+        let mut overlap = BVec4A::splat(true);
+        for k in 0..3 {
+            overlap &= self.low(k).cmple(Vec4::splat(other.high[k]));
+            overlap &= self.high(k).cmpge(Vec4::splat(other.low[k]));
+        }
+        overlap.bitmask()
+    }
+}
+
+/// What a node knows of its children: a triangle each, or all those below a node.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Children {
+    pub(crate) bounds: Boxes,
+    /// Around the tets behind them.
+    pub(crate) tets: Boxes,
+    /// Around their normals.
+    pub(crate) normals: Boxes,
+    /// Around their steps.
+    pub(crate) steps: Boxes,
+}
+
+impl Children {
+    pub(crate) const NONE: Self = Self {
+        bounds: Boxes::EMPTY,
+        tets: Boxes::EMPTY,
+        normals: Boxes::EMPTY,
+        steps: Boxes::EMPTY,
+    };
+}
+
+/// The answers of children to two questions of a search, as bits. What answers yes to one of them is looked at.
+#[derive(Clone, Copy)]
+pub(crate) struct Answers {
+    pub(crate) first: u32,
+    pub(crate) second: u32,
 }
 
 /// What a tree takes over of a triangle.
@@ -176,24 +226,17 @@ impl Item {
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Node {
-    around: Around,
-    /// The node after all those below it.
-    next: u32,
-    /// Of a leaf, the place of its first triangle.
-    first: u32,
-    /// Of a leaf, the number of its triangles; 0 for other nodes.
+    children: Children,
+    /// The places of the children among the triangles or among the nodes, where they come later.
+    below: [u32; CHILDREN],
     count: u32,
+    holds_triangles: bool,
 }
 
 /// A triangle in a tree.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Leaf {
-    pub(crate) bounds: Box32,
-    /// Of unit length up to single precision.
-    pub(crate) normal: Vec4,
-    /// Around the tet behind it.
-    pub(crate) tet: Box32,
     /// Around the steps of its corners.
     pub(crate) steps: Box32,
     pub(crate) number: u32,
@@ -240,95 +283,119 @@ impl TriangleTree {
         self.refit(boxes, item_of);
     }
 
-    fn fill(&mut self, boxes: &[Box32], item_of: impl Fn(u32) -> Item) {
+    fn push(&mut self) -> usize {
+        self.nodes.push(Node {
+            children: Children::NONE,
+            below: [0; CHILDREN],
+            count: 0,
+            holds_triangles: false,
+        });
+        self.nodes.len() - 1
+    }
+
+    fn adopt(&mut self, node: usize, child: u32) {
+        let node = &mut self.nodes[node];
+        node.below[node.count as usize] = child;
+        node.count += 1;
+    }
+
+    /// Appends the nodes over parts, each the places of its triangles and the box around them; returns the first.
+    fn split_parts(&mut self, parts: &mut [(Range<usize>, Box32)], boxes: &[Box32]) -> u32 {
+        if let [(range, _)] = parts {
+            return self.split(range.clone(), boxes);
+        }
+        let node = self.push();
+        let (left, right) = halve_parts(parts);
+        for half in [left, right] {
+            if half.len() == 1 {
+                let child = self.split_parts(half, boxes);
+                self.adopt(node, child);
+            } else {
+                let (left, right) = halve_parts(half);
+                for quarter in [left, right] {
+                    let child = self.split_parts(quarter, boxes);
+                    self.adopt(node, child);
+                }
+            }
+        }
+        index(node)
+    }
+
+    /// Appends the nodes over triangles in some places; returns the first.
+    fn split(&mut self, range: Range<usize>, boxes: &[Box32]) -> u32 {
+        let node = self.push();
+        if range.len() <= CHILDREN {
+            self.nodes[node].holds_triangles = true;
+            for place in range {
+                self.adopt(node, index(place));
+            }
+            return index(node);
+        }
+        for half in self.halve(range, boxes) {
+            if half.len() <= CHILDREN {
+                let child = self.split(half, boxes);
+                self.adopt(node, child);
+            } else {
+                for quarter in self.halve(half, boxes) {
+                    let child = self.split(quarter, boxes);
+                    self.adopt(node, child);
+                }
+            }
+        }
+        index(node)
+    }
+
+    /// Orders the triangles of a range so that those of its first half are lower along the longest axis.
+    fn halve(&mut self, range: Range<usize>, boxes: &[Box32]) -> [Range<usize>; 2] {
+        let items = &mut self.order[range.clone()];
+        let of = |number: u32| boxes[number as usize];
+        let axis = around(items, boxes).longest_axis();
+        let half = items.len() / 2;
+        items.select_nth_unstable_by(half, |&i, &j| {
+            let centers = (of(i).center(axis), of(j).center(axis));
+            centers.0.total_cmp(&centers.1).then(i.cmp(&j))
+        });
+        let middle = range.start + half;
+        [range.start..middle, middle..range.end]
+    }
+
+    /// Takes over the present boxes and normals, the boxes of removed triangles empty.
+    pub(crate) fn refit(&mut self, boxes: &[Box32], item_of: impl Fn(u32) -> Item) {
         self.leaves.clear();
         let leaves = self.order.iter().map(|&number| {
             let item = item_of(number);
             Leaf {
-                bounds: boxes[number as usize],
-                normal: item.normal.extend(0.0).as_vec4(),
-                tet: item.tet,
                 steps: item.steps,
                 number,
                 part: item.part,
             }
         });
         self.leaves.extend(leaves);
-    }
-
-    /// Appends the nodes over parts, each the places of its triangles and the box around them.
-    fn split_parts(&mut self, parts: &mut [(Range<usize>, Box32)], boxes: &[Box32]) {
-        if let [(range, _)] = parts {
-            self.split(range.start, range.end, boxes);
-            return;
-        }
-        let all = parts.iter().map(|(_, bounds)| *bounds);
-        let bounds = all.fold(Box32::EMPTY, Box32::union);
-        let node = self.nodes.len();
-        self.nodes.push(Node {
-            around: Around::NOTHING,
-            next: 0,
-            first: 0,
-            count: 0,
-        });
-        let axis = bounds.longest_axis();
-        let half = parts.len() / 2;
-        parts.select_nth_unstable_by(half, |(one, i), (other, j)| {
-            let (i, j) = (i.center(axis), j.center(axis));
-            i.total_cmp(&j).then(one.start.cmp(&other.start))
-        });
-        let (left, right) = parts.split_at_mut(half);
-        self.split_parts(left, boxes);
-        self.split_parts(right, boxes);
-        self.nodes[node].next = index(self.nodes.len());
-    }
-
-    fn split(&mut self, first: usize, end: usize, boxes: &[Box32]) {
-        let items = &mut self.order[first..end];
-        let of = |number: u32| boxes[number as usize];
-        let bounds = around(items, boxes);
-        let is_leaf = items.len() <= LEAF;
-        let node = self.nodes.len();
-        self.nodes.push(Node {
-            around: Around::NOTHING,
-            next: 0,
-            first: index(first),
-            count: if is_leaf { index(items.len()) } else { 0 },
-        });
-        if !is_leaf {
-            let axis = bounds.longest_axis();
-            let half = items.len() / 2;
-            items.select_nth_unstable_by(half, |&i, &j| {
-                let centers = (of(i).center(axis), of(j).center(axis));
-                centers.0.total_cmp(&centers.1).then(i.cmp(&j))
-            });
-            self.split(first, first + half, boxes);
-            self.split(first + half, end, boxes);
-        }
-        self.nodes[node].next = index(self.nodes.len());
-    }
-
-    /// Takes over the present boxes and normals, the boxes of removed triangles empty.
-    pub(crate) fn refit(&mut self, boxes: &[Box32], item_of: impl Fn(u32) -> Item) {
-        self.fill(boxes, item_of);
         for i in (0..self.nodes.len()).rev() {
-            let node = self.nodes[i];
-            self.nodes[i].around = if node.count > 0 {
-                let triangles = node.first as usize..(node.first + node.count) as usize;
-                let leaves = self.leaves[triangles].iter();
-                leaves.fold(Around::NOTHING, |around, leaf| {
-                    around.union(Around {
-                        bounds: leaf.bounds,
-                        tets: leaf.tet,
-                        normals: Box32::at(leaf.normal),
-                        steps: leaf.steps,
-                    })
-                })
-            } else {
-                let left = &self.nodes[i + 1];
-                let right = &self.nodes[left.next as usize];
-                left.around.union(right.around)
-            };
+            let (above, below) = self.nodes.split_at_mut(i + 1);
+            let node = &mut above[i];
+            let Children {
+                bounds,
+                tets,
+                normals,
+                steps,
+            } = &mut node.children;
+            for (child, &place) in node.below[..node.count as usize].iter().enumerate() {
+                if node.holds_triangles {
+                    let number = self.order[place as usize];
+                    let item = item_of(number);
+                    bounds.set(child, &boxes[number as usize]);
+                    tets.set(child, &item.tet);
+                    normals.set(child, &Box32::at(item.normal.extend(0.0).as_vec4()));
+                    steps.set(child, &item.steps);
+                } else {
+                    let child_node = &below[place as usize - i - 1].children;
+                    bounds.set(child, &child_node.bounds.all());
+                    tets.set(child, &child_node.tets.all());
+                    normals.set(child, &child_node.normals.all());
+                    steps.set(child, &child_node.steps.all());
+                }
+            }
         }
     }
 
@@ -347,36 +414,48 @@ impl TriangleTree {
     /// Calls `visit` with each triangle whose box overlaps `wanted`.
     #[inline]
     pub(crate) fn search(&self, wanted: &Box32, mut visit: impl FnMut(&Leaf)) {
-        self.search_where(
-            |around| around.bounds.overlaps(wanted),
-            |leaf| {
-                if leaf.bounds.overlaps(wanted) {
-                    visit(leaf);
-                }
-                true
-            },
-        );
+        let ask = |children: &Children| Answers {
+            first: children.bounds.overlapping(wanted),
+            second: 0,
+        };
+        self.search_where(ask, |leaf, _| {
+            visit(leaf);
+            true
+        });
     }
 
-    /// Calls `visit` with each triangle but for those below a node that is refused, until it returns false. Whether it
-    /// never did.
+    /// Calls `visit` with each triangle that answers yes to one of the questions that `ask` asks, as all those above it do,
+    /// and with its two answers, until it returns false. Whether it never did.
     #[inline]
     pub(crate) fn search_where(
         &self,
-        is_wanted: impl Fn(&Around) -> bool,
-        mut visit: impl FnMut(&Leaf) -> bool,
+        ask: impl Fn(&Children) -> Answers,
+        mut visit: impl FnMut(&Leaf, [bool; 2]) -> bool,
     ) -> bool {
-        let mut here = 0;
-        while let Some(node) = self.nodes.get(here) {
-            if !is_wanted(&node.around) {
-                here = node.next as usize;
-                continue;
+        if self.nodes.is_empty() {
+            return true;
+        }
+        let mut waiting = [0; WAITING];
+        let mut count = 1;
+        while count > 0 {
+            count -= 1;
+            let node = &self.nodes[waiting[count] as usize];
+            let Answers { first, second } = ask(&node.children);
+            let mut left = (first | second) & ((1 << node.count) - 1);
+            while left != 0 {
+                let child = left.trailing_zeros() as usize;
+                left &= left - 1;
+                let place = node.below[child];
+                if node.holds_triangles {
+                    let answers = [first, second].map(|bits| bits & (1 << child) != 0);
+                    if !visit(&self.leaves[place as usize], answers) {
+                        return false;
+                    }
+                } else {
+                    waiting[count] = place;
+                    count += 1;
+                }
             }
-            let triangles = node.first as usize..(node.first + node.count) as usize;
-            if !self.leaves[triangles].iter().all(&mut visit) {
-                return false;
-            }
-            here += 1;
         }
         true
     }
@@ -387,8 +466,24 @@ impl TriangleTree {
     }
 }
 
+/// Two halves of parts, the first lower along the longest axis.
+fn halve_parts(
+    parts: &mut [(Range<usize>, Box32)],
+) -> (&mut [(Range<usize>, Box32)], &mut [(Range<usize>, Box32)]) {
+    let all = parts.iter().map(|(_, bounds)| *bounds);
+    let axis = all.fold(Box32::EMPTY, Box32::union).longest_axis();
+    let half = parts.len() / 2;
+    parts.select_nth_unstable_by(half, |(one, i), (other, j)| {
+        let (i, j) = (i.center(axis), j.center(axis));
+        i.total_cmp(&j).then(one.start.cmp(&other.start))
+    });
+    parts.split_at_mut(half)
+}
+
 #[cfg(test)]
 mod tests {
+    use std::cell::Cell;
+
     use super::*;
 
     fn boxes(count: usize, seed: usize, size: f64) -> Vec<Box32> {
@@ -400,6 +495,10 @@ mod tests {
                 Box32::around(&Bounds::around([low, high]))
             })
             .collect()
+    }
+
+    fn overlap(one: &Box32, other: &Box32) -> bool {
+        (0..3).all(|k| one.low[k] <= other.high[k] && other.low[k] <= one.high[k])
     }
 
     fn found(tree: &TriangleTree, wanted: &Box32) -> Vec<u32> {
@@ -431,7 +530,7 @@ mod tests {
             for round in 0..3 {
                 for wanted in boxes(50, 1234, 8.0) {
                     let expected: Vec<u32> = (0..index(count))
-                        .filter(|&i| now[i as usize].overlaps(&wanted))
+                        .filter(|&i| overlap(&now[i as usize], &wanted))
                         .collect();
                     assert_eq!(found(&tree, &wanted), expected);
                 }
@@ -463,24 +562,26 @@ mod tests {
         let mut left_out = 0;
         for wanted in boxes(50, 99, 8.0) {
             let mut found = Vec::new();
-            let faces = |normal: f32| normal < -0.5;
+            let asked = Cell::new(0);
             tree.search_where(
-                |around| {
-                    let faces = faces(around.normals.low[0]);
-                    faces && around.bounds.overlaps(&wanted)
-                },
-                |leaf| {
-                    if leaf.bounds.overlaps(&wanted) {
-                        found.push((leaf.number, leaf.normal.x));
+                |children| {
+                    asked.set(asked.get() + 1);
+                    let faces = children.normals.low(0).cmplt(Vec4::splat(-0.5)).bitmask();
+                    Answers {
+                        first: faces & children.bounds.overlapping(&wanted),
+                        second: 0,
                     }
+                },
+                |leaf, _| {
+                    found.push(leaf.number);
                     true
                 },
             );
-            let all = 0..index(count);
-            let all = all.filter(|&i| now[i as usize].overlaps(&wanted));
-            left_out += all.clone().count() - found.len();
-            let mut found: Vec<u32> = found.iter().filter(|f| faces(f.1)).map(|f| f.0).collect();
+            left_out += tree.nodes.len() - asked.get();
             found.sort_unstable();
+            let faces = |normal: f32| normal < -0.5;
+            let all = 0..index(count);
+            let all = all.filter(|&i| overlap(&now[i as usize], &wanted));
             let expected = all.filter(|&i| faces(normals[i as usize].as_vec3().x));
             assert!(expected.eq(found));
         }
