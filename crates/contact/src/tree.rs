@@ -19,9 +19,9 @@ use crate::index::index;
 
 /// The most children of a node.
 const CHILDREN: usize = 4;
-/// Nodes that wait to be looked at in a search at most: three more at each level of a tree over 2³² triangles in as many
-/// parts.
-const WAITING: usize = 3 * 32 + 1;
+/// Nodes that wait to be looked at in a search at most: three more at each level. A level is at most half as large as the
+/// one above, a quarter but for the last one of parts and of triangles, and there are at most 2³² triangles.
+const WAITING: usize = 3 * 34 + 1;
 
 /// A box in single precision around one in double precision; empty where `low` exceeds `high`. The last of four numbers is
 /// 0, so that a box is compared in lanes.
@@ -42,9 +42,21 @@ impl Box32 {
     /// The smallest box of this kind around a box.
     #[inline]
     pub(crate) fn around(bounds: &Bounds) -> Self {
+        let (low, high) = (bounds.low, bounds.high);
+        // Written out: a closure over an array is not inlined here.
         Self {
-            low: bounds.low.extend(0.0).to_array().map(rounded_down),
-            high: bounds.high.extend(0.0).to_array().map(rounded_up),
+            low: [
+                rounded_down(low.x),
+                rounded_down(low.y),
+                rounded_down(low.z),
+                0.0,
+            ],
+            high: [
+                rounded_up(high.x),
+                rounded_up(high.y),
+                rounded_up(high.z),
+                0.0,
+            ],
         }
     }
 
@@ -520,6 +532,7 @@ mod tests {
             (9, 3),
             (200, 1),
             (200, 7),
+            (200, 200),
         ] {
             let mut now = boxes(count, 0, 4.0);
             let item_of = |i: u32| Item {
@@ -561,28 +574,28 @@ mod tests {
         tree.build(0..index(count), &now, item_of);
         let mut left_out = 0;
         for wanted in boxes(50, 99, 8.0) {
-            let mut found = Vec::new();
-            let asked = Cell::new(0);
-            tree.search_where(
-                |children| {
+            let search = |limit: f32| {
+                let (mut found, asked) = (Vec::new(), Cell::new(0));
+                let ask = |children: &Children| {
                     asked.set(asked.get() + 1);
-                    let faces = children.normals.low(0).cmplt(Vec4::splat(-0.5)).bitmask();
+                    let faces = children.normals.low(0).cmplt(Vec4::splat(limit));
                     Answers {
-                        first: faces & children.bounds.overlapping(&wanted),
+                        first: faces.bitmask() & children.bounds.overlapping(&wanted),
                         second: 0,
                     }
-                },
-                |leaf, _| {
+                };
+                tree.search_where(ask, |leaf, _| {
                     found.push(leaf.number);
                     true
-                },
-            );
-            left_out += tree.nodes.len() - asked.get();
-            found.sort_unstable();
-            let faces = |normal: f32| normal < -0.5;
+                });
+                found.sort_unstable();
+                (found, asked.get())
+            };
+            let (found, asked) = search(-0.5);
+            left_out += search(2.0).1 - asked;
             let all = 0..index(count);
             let all = all.filter(|&i| overlap(&now[i as usize], &wanted));
-            let expected = all.filter(|&i| faces(normals[i as usize].as_vec3().x));
+            let expected = all.filter(|&i| normals[i as usize].as_vec3().x < -0.5);
             assert!(expected.eq(found));
         }
         assert!(left_out > 20, "{left_out}");
