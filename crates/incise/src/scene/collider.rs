@@ -1,7 +1,11 @@
 //! [`ColliderSpec`]: an obstacle.
 
+use std::fmt;
+
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::value::MapAccessDeserializer;
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A solid obstacle for particles.
 ///
@@ -78,6 +82,7 @@ pub enum ColliderSpec {
         #[schemars(extend("unit" = "m"))]
         half_extents: [f64; 3],
         /// Rotation; absent: the edges are parallel to the axes.
+        #[serde(default, deserialize_with = "rotation")]
         rotation: Option<RotationSpec>,
         /// Coefficient of friction.
         #[serde(default)]
@@ -163,6 +168,27 @@ impl ColliderSpec {
         *velocity = v;
         self
     }
+}
+
+/// Reads a rotation from a table. A list, which might be angles or a quaternion, would be taken for the values of its keys.
+fn rotation<'de, D: Deserializer<'de>>(reader: D) -> Result<Option<RotationSpec>, D::Error> {
+    struct Table;
+    impl<'de> Visitor<'de> for Table {
+        type Value = Option<RotationSpec>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a table with axis and angle_degrees")
+        }
+
+        fn visit_unit<E>(self) -> Result<Self::Value, E> {
+            Ok(None)
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Self::Value, A::Error> {
+            RotationSpec::deserialize(MapAccessDeserializer::new(map)).map(Some)
+        }
+    }
+    reader.deserialize_any(Table)
 }
 
 /// A rotation of a collider.

@@ -1,12 +1,16 @@
 //! [`in_scene_words`]: messages of the TOML reader in the words of scene files.
 //!
 //! The reader speaks of Rust: `invalid value: integer -5, expected usize`. Those who write scenes know lists, tables,
-//! numbers and keys. Cost: that of the message.
+//! numbers and keys. Cost: that of the message; for a key in the wrong table that of the schema.
 
+use serde_json::Value;
+
+use super::schema;
 use crate::names::similar;
 
 /// A message of the TOML reader about a wrong type or value, a missing key, or an unknown name, in the words of scene files;
-/// other messages stay. An unknown name comes with the known one that is most similar, or with all.
+/// other messages stay. An unknown name comes with the known one that is most similar, with the tables that have such a key,
+/// or with all known ones.
 pub(super) fn in_scene_words(message: &str) -> String {
     let message = message.trim_end().replace('\n', " ");
     if let Some(names) = message.strip_prefix("unexpected keys in table: ") {
@@ -59,11 +63,37 @@ fn unknown_name(unknown: &str, known: &[&str]) -> String {
     match similar(unknown, known.iter().copied()) {
         Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
         None if known.is_empty() => format!("unknown key or value '{unknown}'"),
+        None if !tables_with(unknown).is_empty() => format!(
+            "unknown key '{unknown}' here: it belongs to {}",
+            tables_with(unknown).join(" or ")
+        ),
         None => format!(
             "unknown key or value '{unknown}': known are '{}'",
             known.join("', '")
         ),
     }
+}
+
+/// The tables of a scene with a key of this name, as they begin in a file.
+fn tables_with(key: &str) -> Vec<String> {
+    let schema = schema();
+    let tables = schema["properties"].as_object().into_iter().flatten();
+    let with_key = tables.filter_map(|(table, of)| {
+        let is_list = of["type"] == "array";
+        let reference = [&of["items"]["$ref"], &of["allOf"][0]["$ref"]];
+        let name = reference.into_iter().find_map(Value::as_str)?;
+        let of = &schema["definitions"][name.rsplit('/').next()?];
+        let kinds = of["oneOf"].as_array().into_iter().flatten();
+        let has_key = |of: &Value| of["properties"].get(key).is_some();
+        (has_key(of) || kinds.into_iter().any(has_key)).then(|| match is_list {
+            true => format!("[[{table}]]"),
+            false => format!("[{table}]"),
+        })
+    });
+    let mut with_key: Vec<String> = with_key.collect();
+    // The schema's order depends on features of the JSON library.
+    with_key.sort_unstable();
+    with_key
 }
 
 /// What was wanted: `f64` and the like, or words already.
@@ -206,6 +236,62 @@ mod tests {
         );
         let of_body = message("[[body]]\ngenerate = 3");
         assert!(of_body.contains("known are 'mesh', 'shape'"), "{of_body}");
+    }
+
+    #[test]
+    fn a_key_in_the_wrong_table_names_its_own() {
+        for (text, key, own) in [
+            ("gravity = [0, 0, -9.81]", "gravity", "[world]"),
+            ("[ground]\nheight = 0", "ground", "[world]"),
+            (
+                "[world]\nquantities = [\"force\"]",
+                "quantities",
+                "[report]",
+            ),
+            (
+                "[cutting]\nself_contact = true",
+                "self_contact",
+                "[contact]",
+            ),
+            (
+                "[world]\nhalf_extents = [1, 1, 1]",
+                "half_extents",
+                "[[collider]]",
+            ),
+            (
+                "[world]\nfriction = 1",
+                "friction",
+                "[[collider]] or [contact]",
+            ),
+        ] {
+            let said = message(text);
+            let expected = format!("unknown key '{key}' here: it belongs to {own}");
+            assert!(said.ends_with(&expected), "{said}");
+        }
+    }
+
+    /// A list would be read as the values of the keys in their order.
+    #[test]
+    fn a_rotation_is_no_list() {
+        let of = |rotation: &str| {
+            let text = format!(
+                "[[collider]]\nkind = \"box\"\ncenter = [0, 0, 0]\nhalf_extents = [1, 1, 1]\nrotation = {rotation}"
+            );
+            Scene::from_toml(&text)
+        };
+        for list in ["[0, 0.2, 0, 1]", "[0, 0, 90]", "[[0, 0, 1], 90]"] {
+            let given = of(list).unwrap_err().to_string();
+            assert!(
+                given.ends_with("expected a table with axis and angle_degrees, found a list"),
+                "{given}"
+            );
+        }
+        of("{ axis = [0, 0, 1], angle_degrees = 90 }").unwrap();
+        let given = of("{ axis = [0, 0, 1] }").unwrap_err().to_string();
+        assert!(
+            given.ends_with("the key 'angle_degrees' is missing"),
+            "{given}"
+        );
     }
 
     #[test]
