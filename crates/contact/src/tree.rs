@@ -255,6 +255,9 @@ pub(crate) struct Leaf {
     pub(crate) part: u32,
 }
 
+/// The places of the triangles of a part and the box around them.
+type Part = (Range<usize>, Box32);
+
 /// A tree over numbered triangles.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -279,7 +282,7 @@ impl TriangleTree {
         self.nodes.clear();
         self.order
             .sort_unstable_by_key(|&number| (item_of(number).part, number));
-        let mut parts: Vec<(Range<usize>, Box32)> = Vec::new();
+        let mut parts: Vec<Part> = Vec::new();
         let mut first = 0;
         for same in self
             .order
@@ -311,8 +314,8 @@ impl TriangleTree {
         node.count += 1;
     }
 
-    /// Appends the nodes over parts, each the places of its triangles and the box around them; returns the first.
-    fn split_parts(&mut self, parts: &mut [(Range<usize>, Box32)], boxes: &[Box32]) -> u32 {
+    /// Appends the nodes over parts; returns the first.
+    fn split_parts(&mut self, parts: &mut [Part], boxes: &[Box32]) -> u32 {
         if let [(range, _)] = parts {
             return self.split(range.clone(), boxes);
         }
@@ -479,9 +482,7 @@ impl TriangleTree {
 }
 
 /// Two halves of parts, the first lower along the longest axis.
-fn halve_parts(
-    parts: &mut [(Range<usize>, Box32)],
-) -> (&mut [(Range<usize>, Box32)], &mut [(Range<usize>, Box32)]) {
+fn halve_parts(parts: &mut [Part]) -> (&mut [Part], &mut [Part]) {
     let all = parts.iter().map(|(_, bounds)| *bounds);
     let axis = all.fold(Box32::EMPTY, Box32::union).longest_axis();
     let half = parts.len() / 2;
