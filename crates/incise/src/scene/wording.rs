@@ -60,18 +60,19 @@ fn unknown_name(unknown: &str, known: &[&str]) -> String {
         .copied()
         .filter(|name| !name.is_empty())
         .collect();
-    match similar(unknown, known.iter().copied()) {
-        Some(name) => format!("unknown key or value '{unknown}': did you mean '{name}'?"),
-        None if known.is_empty() => format!("unknown key or value '{unknown}'"),
-        None if !tables_with(unknown).is_empty() => format!(
-            "unknown key '{unknown}' here: it belongs to {}",
-            tables_with(unknown).join(" or ")
-        ),
-        None => format!(
-            "unknown key or value '{unknown}': known are '{}'",
-            known.join("', '")
-        ),
+    if let Some(name) = similar(unknown, known.iter().copied()) {
+        return format!("unknown key or value '{unknown}': did you mean '{name}'?");
     }
+    let tables = tables_with(unknown);
+    if !tables.is_empty() {
+        let tables = tables.join(" or ");
+        return format!("unknown key '{unknown}' here: it belongs to {tables}");
+    }
+    if known.is_empty() {
+        return format!("unknown key or value '{unknown}'");
+    }
+    let known = known.join("', '");
+    format!("unknown key or value '{unknown}': known are '{known}'")
 }
 
 /// The tables of a scene with a key of this name, as they begin in a file.

@@ -102,7 +102,8 @@ impl<R: Float> Solid<R> {
         }
     }
 
-    /// Whether a point is outside, which [`Solid::nearest`] then agrees with; false for some that are outside but near. Cheap.
+    /// True only if the distance of a point is not negative, also as [`Solid::nearest`] rounds it. False for some points
+    /// that are outside but near. Cost: a few operations.
     #[inline(always)]
     pub(crate) fn clears(&self, x: R::Vector) -> bool {
         match *self {
@@ -126,7 +127,7 @@ impl<R: Float> Solid<R> {
         }
     }
 
-    /// Whether all points of a box are outside, which [`Solid::nearest`] then agrees with; false for some that are. Cheap.
+    /// True only if no point of a box has a negative distance, also as [`Solid::nearest`] rounds it. False for some boxes that are outside. Cost: that of two boxes.
     pub(crate) fn clears_box(&self, low: [R; 3], high: [R; 3]) -> bool {
         let [own_low, own_high] = match *self {
             Self::Plane { normal, offset } => {
