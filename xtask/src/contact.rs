@@ -549,7 +549,7 @@ do not move alike; the solver's work a tet does not depend on the motion. In the
 particles across it; on the ground most are vertices near triangles.";
 
 const COSTS: &str = "The share has all that a frame takes longer: finding and coloring (once a frame), and the passes of \
-the solver over the contacts (once a substep). Time by stage of the search is in `cargo bench --bench contact`. A scene \
+the solver over the contacts (once a substep). Time by stage of the search is in `cargo bench -p incise-benches --bench contact`. A scene \
 without `[contact]` is a row of [the overhead page](overhead.md).";
 
 const AIMS: &str = "The aims: 0.1% of an edge in a stack, 1% in a body at rest on itself, 10% in a pile of organs. No \

@@ -26,6 +26,10 @@ const ON_SHEET: u64 = 12;
 const COLUMNS: usize = 4;
 /// Largest width of an image on the contact sheet in pixels.
 const SHEET_WIDTH: u32 = 360;
+/// Part of the particles outside of the image from which bodies have left it.
+const LEFT: f64 = 0.1;
+/// Smallest zoom at which a body is still more than a dot.
+const SMALLEST_ZOOM: f64 = 0.05;
 /// A ground deeper below the bodies than this many of their diagonals is not included in the view.
 const DEEPEST: f64 = 3.0;
 
@@ -36,6 +40,8 @@ pub(crate) struct Pictures {
     note: Option<String>,
     render_scene: RenderScene,
     camera: Camera,
+    /// Azimuth and elevation in degrees, and zoom.
+    view: [f64; 3],
     style: Style,
     size: [u32; 2],
     strokes: Vec<StrokeSpec>,
@@ -52,6 +58,9 @@ pub(crate) struct Pictures {
     on_sheet: Vec<u64>,
     sheet: Vec<(Image, String)>,
     count: u64,
+    /// The first picture that bodies have left, and how far from the middle they are at most, in half images.
+    left: Option<u64>,
+    widest: f64,
 }
 
 impl Pictures {
@@ -82,6 +91,7 @@ impl Pictures {
             renderer,
             note,
             camera: camera(arguments, scene, render_scene.bounds(simulation)),
+            view: arguments.view.unwrap_or(VIEW),
             render_scene,
             style: Style {
                 color_by: arguments.color_by,
@@ -103,6 +113,8 @@ impl Pictures {
             },
             sheet: Vec::new(),
             count: 0,
+            left: None,
+            widest: 0.0,
         }))
     }
 
@@ -133,6 +145,7 @@ impl Pictures {
             return Ok(());
         }
         let picture = self.draw(simulation)?;
+        self.note_view(simulation);
         if saved {
             picture.write_png(folder.join(format!("frame_{frame:05}.png")))?;
             self.count += 1;
@@ -180,8 +193,42 @@ impl Pictures {
             .picture(render_scene, simulation, camera, &self.style, self.size)
     }
 
-    /// Completes the contact sheet and the animation; returns a line about them.
+    /// Notes whether bodies have left the picture.
+    fn note_view(&mut self, simulation: &Simulation) {
+        let size = self.size.map(f64::from);
+        let positions = simulation.positions();
+        let mut outside = 0;
+        for &x in positions {
+            let pixel = self.camera.project(x, size);
+            let across = pixel.map(|p| {
+                (2.0 * p.x / size[0] - 1.0)
+                    .abs()
+                    .max((2.0 * p.y / size[1] - 1.0).abs())
+            });
+            outside += usize::from(across.is_none_or(|across| across > 1.0));
+            self.widest = self.widest.max(across.unwrap_or(f64::INFINITY));
+        }
+        if outside as f64 > LEFT * positions.len() as f64 {
+            self.left.get_or_insert(simulation.report().frame);
+        }
+    }
+
+    /// A line about bodies that have left the picture.
+    fn view_note(&self) -> Option<String> {
+        let frame = self.left?;
+        let [azimuth, elevation, zoom] = self.view;
+        let zoom = 0.95 * zoom / self.widest;
+        let fix = if zoom < SMALLEST_ZOOM {
+            String::new()
+        } else {
+            format!(": --view={azimuth},{elevation},{zoom:.2} shows them")
+        };
+        Some(format!("bodies leave the picture at frame {frame}{fix}"))
+    }
+
+    /// Completes the contact sheet and the animation; returns lines about them.
     pub(crate) fn finish(self, folder: &Path) -> anyhow::Result<String> {
+        let view_note = self.view_note();
         let mut written = Vec::new();
         if self.saved {
             contact_sheet(&self.sheet, COLUMNS).write_png(folder.join("contact_sheet.png"))?;
@@ -198,7 +245,11 @@ impl Pictures {
         let renderer = self.renderer.describe();
         let why = self.note.map(|note| format!(": {note}"));
         let why = why.unwrap_or_default();
-        Ok(format!("{}, drawn by {renderer}{why}", written.join(", ")))
+        let line = format!("{}, drawn by {renderer}{why}", written.join(", "));
+        Ok(match view_note {
+            Some(note) => format!("{line}\n{note}"),
+            None => line,
+        })
     }
 }
 

@@ -14,7 +14,7 @@ use crate::args::{BackendName, PrecisionName, RunArguments};
 use crate::failure::Failure;
 use crate::output::{Output, require_mesh_file, save_mesh};
 use crate::pictures::Pictures;
-use crate::print::print;
+use crate::print::{count, print};
 use crate::summary::Summary;
 
 /// Default number of frames.
@@ -23,6 +23,25 @@ const FRAMES: u64 = 200;
 pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     // Drawing shares the threads of the simulation.
     in_pool(arguments.threads, || simulate(arguments))
+}
+
+/// Names the strokes that begin after the last frame.
+#[expect(clippy::print_stderr, reason = "warnings of a run go to stderr")]
+fn print_late_strokes(scene: &Scene, frames: u64) {
+    for (number, stroke) in scene.stroke.iter().enumerate() {
+        let first = stroke.first_frame();
+        if first >= frames {
+            let enough = stroke.last_frame() + 1;
+            let these = count(
+                usize::try_from(frames).unwrap_or(usize::MAX),
+                "frame",
+                "frames",
+            );
+            eprintln!(
+                "warning: stroke[{number}] begins at frame {first}, and the run ends after {these}: --frames {enough} includes it"
+            );
+        }
+    }
 }
 
 /// Runs a function on a pool of its own with this number of threads, or on the common one.
@@ -58,6 +77,9 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     let jsonl = arguments.jsonl.as_deref();
     let mut output = Output::create(folder, jsonl, &scene, frames, pictures)?;
 
+    if !arguments.quiet {
+        print_late_strokes(&scene, frames);
+    }
     let kappa = simulation.kappa();
     let mut summary = Summary::new(simulation.report());
     let mut checked = 0;
@@ -113,7 +135,8 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         }
         if arguments.check {
             print(format_args!(
-                "checked after each of {checked} cuts: mesh, volume at rest, masses, clusters, colors, pieces"
+                "checked after {}: mesh, volume at rest, masses, clusters, colors, pieces",
+                count(checked, "cut", "cuts")
             ))?;
         }
         print(format_args!("files are in {}", folder.display()))?;

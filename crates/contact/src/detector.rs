@@ -68,10 +68,10 @@ const SPARE: f64 = 0.5;
 /// The search looks ahead in time by so many times the distance by which a frame may bring surfaces together before it is
 /// divided: a few vertices may be faster.
 const FURTHER: f64 = 4.0;
-/// A frame is divided if more than this part of the vertices of a piece close in on what is near them by more than that
-/// distance,
+/// A frame is divided if more than this part of the vertices of a piece approach what is near them by more than
+/// [`ContactSettings::reach`] and half of the skin.
 const FAST: f64 = 0.01;
-/// or parts near each other move by so many times the distance relative to each other as a whole: most of that may be
+/// A frame is divided if two near parts move relative to each other by this many times that distance, most of which may be
 /// sliding.
 const WHOLE: f64 = 2.0;
 /// Where more than this part of all vertices have moved out of their reserve, all are searched for.
@@ -319,7 +319,7 @@ impl ContactDetector {
         Ok(())
     }
 
-    /// Searches in the next update, even if nothing has moved: to measure what a search costs.
+    /// Forces a search in the next update, to measure its cost.
     pub fn search_again(&mut self) {
         self.search_is_due = true;
     }
@@ -591,8 +591,8 @@ impl ContactDetector {
         self.edges.extend(edges);
     }
 
-    /// Into how many equal parts the frame should be divided, each with an update of its own: 1, 2 or 4. More than 1 if
-    /// more than 1% of the vertices of a part close in on what is near them by more than [`ContactSettings::reach`] and half
+    /// Returns the number of equal parts, 1, 2 or 4, into which to divide the frame, with an update for each. More than 1
+    /// if more than 1% of the vertices of a part approach what is near them by more than [`ContactSettings::reach`] and half
     /// of the skin, or if parts near each other move relative to each other as a whole by twice as much. Fewer vertices are
     /// not worth the time: the search looks further for them. O(surface vertices + candidates + pieces²).
     ///
@@ -1238,7 +1238,7 @@ enum Due {
     Nothing,
     /// It is searched for.
     Search,
-    /// And so is all that is near its triangles.
+    /// The vertex and all vertices near its triangles are searched for.
     Moved,
 }
 

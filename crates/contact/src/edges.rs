@@ -44,7 +44,8 @@ const PARALLEL: f64 = 0.05;
 const BENT: f64 = 0.1;
 /// Edges that cross beyond their ends or too near to them are no candidate if they have passed by this, in mean edges.
 const PASSED: f64 = 0.01;
-/// Nor are edges that have passed each other deeper than this many times the distance from where they cross to an end.
+/// Edges are no candidate if they have passed each other deeper than this many times the distance from where they cross to
+/// an end.
 const DEEP: f64 = 10.0;
 /// Candidates kept of an edge.
 const NEAREST: usize = 4;

@@ -1,6 +1,6 @@
-//! [`ContactError`]: what can be wrong with settings or with a detector that does not belong to its mesh.
+//! [`ContactError`]: settings out of range, and detectors that do not match their mesh.
 
-/// Why a detector was refused or does not agree with its mesh.
+/// Error of a contact detector: a setting out of range, or a state that does not match its mesh.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ContactError {
@@ -22,7 +22,7 @@ pub enum ContactError {
         /// How many particles there are.
         particles: usize,
     },
-    /// The state is not the one that the mesh asks for: a delta was left out, or there is a defect in this crate.
+    /// The state differs from one rebuilt from the mesh: a delta was not applied, or this crate has a defect.
     #[error("the contact state does not match its mesh: {0}")]
     Differs(String),
 }

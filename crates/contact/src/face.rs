@@ -22,13 +22,13 @@ const FACES_NOT: f64 = -0.1;
 /// How far beyond an edge or a corner, in altitudes of the triangle, a contact that touches there goes on.
 const MARGIN: f64 = 0.25;
 
-/// Where the surface of a contact ends. See [`FaceContact::limit`].
+/// Limit of a contact at a rim or a corner, beyond which it does not act. See [`FaceContact::limit`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct FaceLimit {
     /// The direction away from the surface in the basis of the triangle, as [`FaceContact::beyond`].
     pub normal: [f64; 3],
-    /// How far in m the contact goes on in that direction.
+    /// Largest distance from the surface in that direction, in m.
     pub distance: f64,
 }
 

@@ -27,9 +27,9 @@ use crate::ContactError;
 use crate::index::{NONE, index};
 use crate::surface::{ContactSurface, SurfaceChange, is_cut};
 
-/// Sides that have slid by this fraction of an edge are no pair any more.
+/// A pair ends when its sides have slid by this fraction of an edge.
 const OF_EDGE: f64 = 0.25;
-/// Nor are those that have slid by this fraction of the way out of the triangles around the pair.
+/// A pair ends when its sides have slid by this fraction of the way out of the triangles around it.
 const OF_HEIGHT: f64 = 0.5;
 /// A pair ends where `|N_a − N_b|` falls below this fraction of `|N_a| + |N_b|`.
 const FOLDED: f64 = 0.5;
@@ -641,8 +641,8 @@ fn opposite(corners: [Option<usize>; 3]) -> Option<[u8; 3]> {
     ((a + 2) % 3 == b && (b + 2) % 3 == c).then(|| [a, b, c].map(|k| [0, 1, 2][k]))
 }
 
-/// How far a particle may slide along a triangle from one of its corners, at rest: a quarter of an edge, and not out of
-/// the triangles around the corner, where the search would see others.
+/// How far a particle may slide along a triangle from one of its corners, at rest: at most a quarter of an edge and half of
+/// the way out of the triangles around the corner, beyond which the search sees others.
 fn largest_slide(mesh: &CuttableMesh, surface: &ContactSurface, slot: u32, corner: usize) -> f64 {
     let corners = surface.triangle(slot).particles;
     let at = |k: usize| mesh.mesh().positions[corners[(corner + k) % 3].index()];

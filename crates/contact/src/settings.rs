@@ -26,8 +26,8 @@ impl BodyPairs {
 
 /// What may touch, and how far ahead contacts are searched.
 ///
-/// Lengths are fractions of the mean edge of the surface at rest ([`crate::ContactDetector::mean_edge`]), so that a
-/// scene in millimeters behaves as one in meters.
+/// `skin` and `reach` are fractions of the mean edge of the surface at rest ([`crate::ContactDetector::mean_edge`]), so
+/// that they fit meshes of any size; `thickness` is in m.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ContactSettings {

@@ -1,9 +1,9 @@
-//! [`ContactState`]: where everything is when contacts are looked for.
+//! [`ContactState`]: mesh, pieces and motion, from which a detector finds contacts.
 
 use glam::DVec3;
 use incise_cutting::{CuttableMesh, PieceTracker};
 
-/// What the detector looks at.
+/// Input of [`crate::ContactDetector::update`]: mesh, pieces, positions and velocities at the start of a frame.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactState<'a> {
     /// The bodies that are solved together as one mesh, with all cuts made so far.

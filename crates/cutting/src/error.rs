@@ -25,7 +25,7 @@ pub enum CutError {
     },
     /// A blade without length cannot cut.
     #[error(
-        "the blade has {points} point(s) and length {length:e}: it needs at least two different points"
+        "the blade has {length} m from its first point to its last (points: {points}): it needs at least two different points"
     )]
     ShortBlade {
         /// Number of points of the polyline.

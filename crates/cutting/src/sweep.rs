@@ -173,7 +173,8 @@ impl Sweep {
         if blade.len() < 2 || length < f64::MIN_POSITIVE {
             return Err(CutError::ShortBlade {
                 points: blade.len(),
-                length,
+                // A sum of nothing is -0.
+                length: length.abs(),
             });
         }
         require_positions(cuttable.mesh(), positions)?;

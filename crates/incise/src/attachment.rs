@@ -14,6 +14,7 @@ use crate::collider::rotation;
 use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
 use crate::validate::{coordinates, value, within};
+use crate::warning::counted;
 
 /// What supports a particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -88,7 +89,7 @@ impl Attachment {
             return Err(value(format!("{field}.frames"), frames, range));
         }
         if spec.path.len() < 2 {
-            let count = format!("{} point(s)", spec.path.len());
+            let count = counted(spec.path.len(), "point");
             return Err(value(format!("{field}.path"), count, "at least two"));
         }
         for &offset in &spec.path {

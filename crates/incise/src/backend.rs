@@ -221,6 +221,11 @@ impl AnySolver {
         limit.is_some() && (0..solver.tet_count()).any(|t| exceeds(solver, t, limit))
     }
 
+    /// Whether the solver is on a device.
+    pub(crate) fn is_on_device(&self) -> bool {
+        matches!(self, Self::Device(_))
+    }
+
     /// Whether the solver is on a device with the cluster mapping of the settings.
     pub(crate) fn is_on(
         &self,

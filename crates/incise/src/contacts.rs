@@ -12,6 +12,8 @@
 //! Source: `incise-contact` and `incise-xpbd`. Cost: that of a detector, about 40 ns a contact to color when the list
 //! changes, and a pass over the contacts after the frame.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use incise_coloring::{Order, greedy};
 use incise_contact::{BodyPairs, ContactDetector, ContactSettings, ContactState};
@@ -142,6 +144,11 @@ pub(crate) struct Contacts {
     touches: Vec<Touch>,
     /// For how long in s a contact has been deep at the end of each frame.
     deep_time: f64,
+    /// Whether contacts were never searched for.
+    is_new: bool,
+    /// Bodies that the first search found inside each other, ascending, with the depth in m, until they are asked for.
+    #[cfg_attr(feature = "save", serde(skip))]
+    starts_inside: BTreeMap<[u32; 2], f64>,
     /// Those of the frame before.
     #[cfg_attr(feature = "save", serde(skip))]
     before: Vec<Touch>,
@@ -235,6 +242,8 @@ impl Contacts {
             surfaces: Vec::new(),
             touches: Vec::new(),
             deep_time: 0.0,
+            is_new: true,
+            starts_inside: BTreeMap::new(),
             before: Vec::new(),
             changes: Vec::new(),
             overlap: None,
@@ -335,6 +344,9 @@ impl Contacts {
             self.read(solver);
         }
         let update = self.detector.update(&self.room.state(mesh, pieces, time));
+        if std::mem::take(&mut self.is_new) {
+            self.note_start();
+        }
         let particles = self.room.positions.len();
         let pairs = self.detector.pairs();
         if update.pairs_changed || pairs.len() != self.pair_colors.vertex_count() {
@@ -481,6 +493,29 @@ impl Contacts {
                 time: self.deep_time,
             });
         }
+    }
+
+    /// Notes the bodies that the first search found deep inside each other, where a contact can part them.
+    fn note_start(&mut self) {
+        let (detector, positions) = (&self.detector, &self.room.positions);
+        let is_fixed = |p: &u32| self.room.fixed.get(*p as usize) == Some(&true);
+        let body_of = detector.body_of();
+        for contact in detector.faces() {
+            let [vertex, corner, ..] = contact.particles;
+            let [one, other] = [vertex, corner].map(|p| body_of[p as usize]);
+            let depth = -contact.gap(positions);
+            let moves = !contact.particles.iter().all(is_fixed);
+            if one != other && moves && depth > DEEP * detector.mean_edge() {
+                let deepest = self.starts_inside.entry([one.min(other), one.max(other)]);
+                let deepest = deepest.or_default();
+                *deepest = deepest.max(depth);
+            }
+        }
+    }
+
+    /// Takes the bodies of the scene that were inside each other at the first search, with the depth in m.
+    pub(crate) fn take_starts_inside(&mut self) -> BTreeMap<[u32; 2], f64> {
+        std::mem::take(&mut self.starts_inside)
     }
 
     /// Takes the overlap that became worth a warning in the last frame.

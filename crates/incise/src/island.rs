@@ -15,7 +15,9 @@ use incise_cutting::{
     improve, remove_tets,
 };
 use incise_mesh::{Bounds, ParticleId, TetId, TetMesh, signed_volume};
-use incise_xpbd::{DistanceConstraint, KappaLimit, SolidBlade, StepReport, StepSettings};
+use incise_xpbd::{
+    Collider, ColliderShape, DistanceConstraint, KappaLimit, SolidBlade, StepReport, StepSettings,
+};
 use web_time::Instant;
 
 pub(crate) use self::judged::Budget;
@@ -157,6 +159,77 @@ fn too_heavy(
     bodies(joined).filter_map(warning).collect()
 }
 
+/// How a scene names an obstacle of a solver: the ground comes first.
+fn obstacle_name(scene: &Scene, number: usize) -> String {
+    match number.checked_sub(usize::from(scene.world.ground.is_some())) {
+        Some(number) => format!("collider[{number}]"),
+        None => "the ground".into(),
+    }
+}
+
+/// The width in m of an obstacle across the way in which bodies meet it; `None` for planes. A moving box goes along the
+/// axis that is nearest to its velocity. One at rest counts as a plate that bodies come to lie on.
+fn narrowest(collider: &Collider) -> Option<f64> {
+    match collider.shape {
+        ColliderShape::Plane { .. } => None,
+        ColliderShape::Sphere { radius, .. } | ColliderShape::Capsule { radius, .. } => {
+            Some(2.0 * radius)
+        }
+        ColliderShape::Box {
+            half_extents,
+            rotation,
+            ..
+        } => {
+            let along = (rotation.normalize().inverse() * collider.velocity).abs();
+            let ahead = if along == DVec3::ZERO {
+                half_extents.min_position()
+            } else {
+                along.max_position()
+            };
+            let across = (0..3).filter(|&k| k != ahead);
+            across.map(|k| 2.0 * half_extents[k]).reduce(f64::min)
+        }
+    }
+}
+
+/// The warnings about obstacles that fit between the particles of a body's surface. O(boundary triangles) for each body
+/// if there are such obstacles.
+fn thin_colliders(
+    scene: &Scene,
+    settings: &StepSettings,
+    joined: &IslandBuilder,
+    cuttable: &CuttableMesh,
+) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    let colliders = settings.colliders.iter().enumerate();
+    let thin = colliders.filter_map(|(number, collider)| Some((number, narrowest(collider)?)));
+    let thin: Vec<(usize, f64)> = thin.collect();
+    if thin.is_empty() {
+        return warnings;
+    }
+    let positions = &cuttable.mesh().positions;
+    for (body, particles) in bodies(joined) {
+        if joined.fixed[particles.clone()].iter().all(|fixed| *fixed) {
+            continue;
+        }
+        let (mut length, mut count) = (0.0, 0);
+        for triangle in cuttable.boundary() {
+            let corners = triangle.particles;
+            if particles.contains(&corners[0].index()) {
+                let [a, b, c] = corners.map(|p| positions[p.index()]);
+                length += a.distance(b) + b.distance(c) + c.distance(a);
+                count += 3;
+            }
+        }
+        let edge = length / f64::from(count.max(1));
+        let of_body = thin.iter().filter(|(_, thickness)| *thickness < edge);
+        warnings.extend(of_body.map(|&(number, thickness)| {
+            Warning::of_thin_collider(body, edge, &obstacle_name(scene, number), thickness)
+        }));
+    }
+    warnings
+}
+
 /// The part of a body's size that a particle may start inside of a collider without a warning.
 const STARTING_DEPTH: f64 = 0.01;
 
@@ -167,7 +240,6 @@ fn starts_inside(
     joined: &IslandBuilder,
     mesh: &TetMesh,
 ) -> Vec<Warning> {
-    let grounds = usize::from(scene.world.ground.is_some());
     let mut warnings = Vec::new();
     for (body, particles) in bodies(joined) {
         let positions = &mesh.positions[particles.clone()];
@@ -181,10 +253,7 @@ fn starts_inside(
             let depths = free.clone().map(|(&x, _)| -collider.distance(x).0);
             let depth = depths.fold(0.0, f64::max);
             if depth > STARTING_DEPTH * size.max_element() {
-                let name = match number.checked_sub(grounds) {
-                    Some(number) => format!("collider[{number}]"),
-                    None => "the ground".into(),
-                };
+                let name = obstacle_name(scene, number);
                 warnings.push(Warning::of_start_inside(body, depth, &name));
             }
         }
@@ -209,6 +278,7 @@ impl Island {
         settings.substeps = substeps;
         let mut at_start = starts_inside(scene, &settings, &joined, cuttable.mesh());
         at_start.extend(too_heavy(scene, &settings, &joined, cuttable.mesh()));
+        at_start.extend(thin_colliders(scene, &settings, &joined, &cuttable));
         let is_open = leaves_open(scene, &joined.substeps, &settings, compute_device.is_gpu());
         let (spec, choice) = resolve(&scene.solver, choice, is_open);
         if scene.solver.method == Method::Auto {
@@ -300,6 +370,7 @@ impl Island {
             self.wake();
         }
         if self.asleep() {
+            collider::advance(&mut self.settings);
             return Ok(StepReport::default());
         }
         // Its body was removed; its colliders are those of all islands and move on.
@@ -530,10 +601,32 @@ impl Island {
         })
     }
 
-    /// Whether a handle, a hand or a collider moves in a frame.
+    /// Whether a moving collider may reach it in the next frame. Positions on a device are not known, so there any may.
+    fn is_reached(&self) -> bool {
+        let colliders = self.settings.colliders.iter();
+        let mut moving = colliders
+            .filter(|collider| collider.velocity != DVec3::ZERO)
+            .peekable();
+        if moving.peek().is_none() || self.solver.is_on_device() {
+            return moving.peek().is_some();
+        }
+        let bounds = Bounds::around(self.positions.iter().copied());
+        let (middle, radius) = (
+            bounds.low.midpoint(bounds.high),
+            bounds.size().length() / 2.0,
+        );
+        let time = self.settings.time_step;
+        moving.any(|collider| {
+            let (distance, _) = collider.distance(middle);
+            // What is no number is near.
+            let is_far = distance > radius + collider.velocity.length() * time;
+            !is_far
+        })
+    }
+
+    /// Whether a handle or a grab moves in a frame, or a collider near it.
     fn is_moved(&self, frame: u64) -> bool {
-        let mut colliders = self.settings.colliders.iter();
-        colliders.any(|collider| collider.velocity != DVec3::ZERO)
+        self.is_reached()
             || self
                 .constraints
                 .attachments

@@ -2,7 +2,7 @@
 //!
 //! This is the facade: a [`Scene`] or a [`SimulationBuilder`] describes bodies, cuts and settings, and a [`Simulation`]
 //! advances them frame by frame. The other crates of the workspace are usable alone and re-exported here: [`mesh`],
-//! [`mesh_io`], [`meshing`], [`graph`], [`coloring`], [`clustering`], [`cutting`], [`xpbd`].
+//! [`mesh_io`], [`meshing`], [`graph`], [`coloring`], [`clustering`], [`cutting`], [`contact`], [`xpbd`].
 //!
 //! ```
 //! use incise::{Scene, Simulation};

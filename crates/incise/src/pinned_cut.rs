@@ -18,7 +18,7 @@ use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 use incise_mesh::{Bounds, ParticleId};
 
 use crate::island::Island;
-use crate::warning::{Warning, WarningCode, box_text};
+use crate::warning::{Warning, WarningCode, box_text, counted};
 
 /// A cut that pinned particles keep closed.
 #[derive(Clone, Debug)]
@@ -34,10 +34,6 @@ impl PinnedCut {
     /// The warning about it, for the stroke at a place like `stroke[0]`.
     pub(crate) fn warning(&self, field: &str) -> Warning {
         let Self { kind, by, bounds } = self;
-        let counted = |count: usize, noun: &str| {
-            let plural = if count == 1 { "" } else { "s" };
-            format!("{count} {noun}{plural}")
-        };
         let what = match kind {
             Kind::Closed { fraction } => {
                 let percent = 100.0 * fraction;

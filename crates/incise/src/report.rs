@@ -144,7 +144,7 @@ impl ChosenMethod {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct BodyReport {
-    /// Numbers of the bodies in the scene; one unless distances join several.
+    /// Numbers of the bodies in the scene; one unless distances or contact join several.
     pub bodies: Vec<usize>,
     /// Substeps of a frame.
     pub substeps: u32,

@@ -44,7 +44,7 @@ use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
 use crate::validate::value;
-use crate::warning::{Warning, WarningCode};
+use crate::warning::{Warning, WarningCode, counted};
 use crate::{Error, Event, Scene, collider, contacts, distance};
 
 pub use builder::{Body, BodyHandle, SimulationBuilder};
@@ -252,7 +252,8 @@ impl Simulation {
     /// Advances by one frame and reports on it.
     ///
     /// # Errors
-    /// If a stroke cannot be carried out. Bodies that it has not cut yet are unchanged.
+    /// If a stroke cannot be carried out (bodies that it has not cut yet are unchanged), or the device is lost or out of
+    /// memory.
     pub fn step(&mut self) -> Result<&FrameReport, Error> {
         // The pool is taken out so that the closure may borrow the rest.
         match self.pool.take() {
@@ -386,6 +387,11 @@ impl Simulation {
                     Event::ContactEnded { pieces, bodies }
                 });
             }
+            for (bodies, depth) in contacts.take_starts_inside() {
+                let bodies = bodies.map(|body| body as usize);
+                let warning = Warning::of_start_inside_each_other(bodies, depth);
+                island.judged.warnings.push(warning);
+            }
             if let Some(overlap) = contacts.take_overlap() {
                 let of_scene = overlap.pieces.map(|piece| pieces.of_scene(number, piece));
                 let warning = overlap.warning(of_scene);
@@ -452,8 +458,8 @@ impl Simulation {
                 .flat_map(|g| g.bodies.clone())
                 .collect();
             let message = format!(
-                "{} particle(s) would have become infinite and were put back: use more substeps",
-                self.state.report.repaired
+                "{} would have become infinite and were put back: use more substeps",
+                counted(self.state.report.repaired, "particle")
             );
             let warning = Warning::new(WarningCode::Repaired, &bodies, message);
             self.state.report.warnings.push(warning);

@@ -1,14 +1,15 @@
 //! [`SleepState`]: the sleep timer of an island of bodies.
 //!
 //! A body whose fastest particle has stayed below a speed for a time is not solved any more: it keeps its positions bit
-//! for bit, its velocities become zero, and it costs nothing until it is cut or one of its attachments moves. A
-//! collider with a velocity keeps all bodies awake, since future contacts are not predicted.
+//! for bit, its velocities become zero, and it costs nothing until it is cut, one of its attachments moves, or a moving
+//! collider may reach the ball around it in the next frame. On a GPU any moving collider keeps all bodies awake.
 //!
 //! Trade-off: the remaining motion below that speed and slow creep are lost. Shear is damped only by the substeps, so a
 //! large soft body vibrates for seconds before it sleeps. The time condition keeps a body awake that is slow only for a
 //! moment, as at the top of its flight.
 //!
-//! Source: sleeping islands as in rigid body engines. Cost: a pass over the particles a frame while awake, none asleep.
+//! Source: sleeping islands as in rigid body engines. Cost: a pass over the particles a frame while awake,
+//! and asleep in scenes with moving colliders.
 
 use crate::scene::SleepSpec;
 

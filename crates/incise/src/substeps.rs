@@ -14,10 +14,10 @@ use serde::Serialize;
 
 use crate::accuracy::{expected_error, is_nearly_incompressible};
 
-/// Slivers are less than this share of a body's volume...
+/// Largest share of a body's volume that its slivers have together.
 const SLIVER_VOLUME: f64 = 1e-3;
 
-/// ... and more than this much stiffer than all other tets: they want more than twice as many substeps.
+/// Slivers have more than this many times the kappa of all other tets, that is, they need more than twice as many substeps.
 const SLIVER_KAPPA: f64 = 4.0;
 
 /// Reason for fewer substeps than all tets need.
@@ -32,6 +32,8 @@ pub enum Shortfall {
     Budget,
     /// Cuts need more than twice the number of the start.
     Growth,
+    /// Cuts need substeps too short for single precision.
+    Precision,
     /// Only a few slivers need more.
     Sliver,
 }

@@ -9,6 +9,7 @@ use crate::live_blade::{LiveBlade, long_enough};
 use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
 use crate::validate::{coordinates, direction, value};
+use crate::warning::counted;
 
 /// The geometry that a stroke cuts with, checked.
 #[derive(Clone, Debug)]
@@ -165,7 +166,7 @@ pub(crate) fn tool(field: &str, spec: &StrokeSpec) -> Result<(Tool, f64), Error>
                 return Err(value(format!("{field}.frames"), frames, range));
             }
             if path.len() < 2 {
-                let given = format!("{} point(s)", path.len());
+                let given = counted(path.len(), "point");
                 return Err(value(format!("{field}.path"), given, "at least two"));
             }
             points("path", path)?;

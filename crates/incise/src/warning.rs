@@ -27,7 +27,7 @@ pub enum WarningCode {
     NotConverged,
     /// The accuracy wanted needs more substeps than fit into `budget_ms`.
     BudgetTooSmall,
-    /// The given number of substeps leaves an expected error of more than a tenth of the motion.
+    /// The given number of substeps leaves an expected error above `accuracy` (0.1 of the motion if absent).
     Inaccurate,
     /// The expected error is too large because Poisson's ratio is near 0.5.
     NearlyIncompressible,
@@ -40,8 +40,10 @@ pub enum WarningCode {
     SliverEnergy,
     /// A region of the scene contains no particle, or no tet.
     EmptyRegion,
-    /// A body starts inside the ground or a collider.
+    /// A body starts inside the ground, a collider or another body that it touches.
     StartsInside,
+    /// A collider is thinner than the surface edges of a body, so that it may pass between its particles.
+    ThinCollider,
     /// A body collapses under its own weight.
     TooHeavy,
     /// The scene has a ground and says nothing about gravity, so nothing falls onto it.
@@ -60,6 +62,16 @@ pub enum WarningCode {
     Repaired,
     /// The largest speed is absurd: the solution has diverged.
     Diverged,
+}
+
+impl WarningCode {
+    /// Whether it is about what a scene describes, whatever the settings of the solver.
+    pub(crate) fn is_of_scene(self) -> bool {
+        matches!(
+            self,
+            Self::EmptyRegion | Self::StartsInside | Self::ThinCollider | Self::TooHeavy
+        )
+    }
 }
 
 /// A problem of a result: its kind, its place in the scene, and a sentence with cause and fix.
@@ -103,6 +115,26 @@ impl Warning {
             "it starts {depth} m inside {collider}, which pushes it out: move one of them by {depth} m"
         );
         Self::new(WarningCode::StartsInside, &[body], message)
+    }
+
+    /// The warning about two bodies that start `depth` m inside of each other.
+    pub(crate) fn of_start_inside_each_other(bodies: [usize; 2], depth: f64) -> Self {
+        let depth = rounded(depth);
+        let message = format!(
+            "they start up to {depth} m inside each other, and contact pushes them apart: move one of them"
+        );
+        Self::new(WarningCode::StartsInside, &bodies, message)
+    }
+
+    /// The warning about a collider thinner than the mean `edge` of a body's surface, both in m.
+    pub(crate) fn of_thin_collider(body: usize, edge: f64, collider: &str, thickness: f64) -> Self {
+        let message = format!(
+            "{collider} is {} m thick, less than the mean edge of the body's surface, {} m: colliders hold particles only, so it \
+             may pass between them without a force; use smaller tets or a thicker collider",
+            rounded(thickness),
+            rounded(edge)
+        );
+        Self::new(WarningCode::ThinCollider, &[body], message)
     }
 
     /// The warning about a body of `size` m that the pressure of its weight, `weight` times its Young's modulus, crushes.
@@ -231,6 +263,25 @@ pub(crate) fn box_text(bounds: &Bounds) -> String {
     )
 }
 
+/// A fraction in percent, with a digit after the point where it is small.
+pub(crate) fn percent(fraction: f64) -> String {
+    let percent = 100.0 * fraction;
+    let number = match percent {
+        _ if percent >= 100.0 => return "100% or more".to_owned(),
+        _ if percent >= 10.0 => format!("{percent:.0}"),
+        _ if percent >= 0.1 => format!("{percent:.1}"),
+        _ => format!("{percent:.0e}"),
+    };
+    format!("{}%", number.trim_end_matches(".0"))
+}
+
+/// A number with its noun, in the plural unless it is 1.
+pub(crate) fn counted(count: impl fmt::Display, noun: &str) -> String {
+    let count = count.to_string();
+    let ending = if count == "1" { "" } else { "s" };
+    format!("{count} {noun}{ending}")
+}
+
 /// The warning about the substeps of bodies, if their expected error is too large. `wanted` is the accuracy that the
 /// scene states; the fix is VBD only if `takes_vbd`.
 pub(crate) fn of_substeps(
@@ -244,15 +295,12 @@ pub(crate) fn of_substeps(
     if choice.expected_error <= accuracy * (1.0 + 1e-9) {
         return None;
     }
-    let percent = match 100.0 * choice.expected_error {
-        percent if percent >= 100.0 => "100% or more".to_owned(),
-        percent => format!("{percent:.0}%"),
-    };
     let needed = choice.substeps_needed;
     let error = format!(
-        "the expected error is {percent} of the motion with {} substeps; {needed} are needed for {:.0}%",
-        choice.substeps,
-        100.0 * accuracy
+        "the expected error is {} of the motion with {}; {needed} are needed for {}",
+        percent(choice.expected_error),
+        counted(choice.substeps, "substep"),
+        percent(accuracy)
     );
     let capped = chosen && choice.shortfall == Some(Shortfall::Cap);
     let (code, fix) = if choice.nearly_incompressible {
@@ -265,11 +313,8 @@ pub(crate) fn of_substeps(
     } else if choice.shortfall == Some(Shortfall::Budget) {
         let fix = "raise budget_ms, use fewer tets or a softer material";
         (WarningCode::BudgetTooSmall, fix)
-    } else if choice.shortfall == Some(Shortfall::Growth) {
-        let fix = format!(
-            "cuts at most double the substeps of the start: set substeps = {needed} for them, or use more snap in strokes"
-        );
-        let message = format!("{error}; {fix}");
+    } else if let Some(Shortfall::Growth | Shortfall::Precision) = choice.shortfall {
+        let message = format!("{error}; {}", fix_after_cuts(choice));
         return Some(Warning::new(WarningCode::SubstepsCapped, bodies, message));
     } else if capped {
         let fix = if takes_vbd {
@@ -282,6 +327,43 @@ pub(crate) fn of_substeps(
         (WarningCode::Inaccurate, "set substeps = \"auto\"")
     };
     Some(Warning::new(code, bodies, format!("{error}; {fix}")))
+}
+
+/// What lets tets that cuts have made be solved with the accuracy wanted.
+fn fix_after_cuts(choice: &Choice) -> String {
+    let needed = choice.substeps_needed;
+    let fix = match choice.shortfall {
+        Some(Shortfall::Growth) => {
+            format!("cuts at most double the substeps of the start: set substeps = {needed}, or ")
+        }
+        Some(Shortfall::Precision) => {
+            "single precision gains nothing from more substeps: set precision = \"f64\", or "
+                .to_owned()
+        }
+        Some(Shortfall::Cap) => format!("set max_substeps = {needed}, or "),
+        Some(Shortfall::Budget) => "raise budget_ms, or ".to_owned(),
+        Some(Shortfall::Sliver) | None => String::new(),
+    };
+    format!("{fix}use more snap in strokes")
+}
+
+/// The warning that tets which cuts have made, `fraction` of the volume, miss the accuracy wanted.
+pub(crate) fn of_outside(
+    bodies: &[usize],
+    fraction: f64,
+    substeps: u32,
+    choice: Option<&Choice>,
+) -> Warning {
+    let fix = choice.map_or_else(
+        || "set substeps = \"auto\", or use more snap in strokes".to_owned(),
+        fix_after_cuts,
+    );
+    let message = format!(
+        "after cuts {} of the volume is in tets too small for the accuracy wanted with {}; {fix}",
+        percent(fraction),
+        counted(substeps, "substep"),
+    );
+    Warning::new(WarningCode::OutsideAccuracy, bodies, message)
 }
 
 /// The notice that bodies are solved by VBD in place of many substeps.
@@ -303,6 +385,15 @@ pub(crate) fn of_vbd(bodies: &[usize], choice: &Choice, spec: &SolverSpec) -> Wa
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn numbers_read_as_text() {
+        let texts = [1.5, 0.42, 0.1, 0.05, 0.0123, 0.002, 2e-9].map(percent);
+        let expected = ["100% or more", "42%", "10%", "5%", "1.2%", "0.2%", "2e-7%"];
+        assert_eq!(texts, expected);
+        assert_eq!(counted(1, "substep"), "1 substep");
+        assert_eq!(counted(21, "substep"), "21 substeps");
+    }
 
     #[test]
     fn warnings_name_their_bodies() {

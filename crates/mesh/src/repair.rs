@@ -65,14 +65,18 @@ impl fmt::Display for RepairReport {
     /// One line per item with a count above 0; `nothing` if all are 0.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let items = [
-            (self.merged, "particles merged with another"),
-            (self.degenerate, "tets without volume removed"),
-            (self.flipped, "tets turned that were inside out"),
-            (self.duplicates, "tets removed that were there twice"),
-            (self.pieces, "pieces removed beside the largest"),
-            (self.tets_of_pieces, "tets removed with them"),
-            (self.unused, "particles removed that no tet uses"),
+            (self.merged, "particle", "merged with another"),
+            (self.degenerate, "tet", "without volume removed"),
+            (self.flipped, "tet", "turned from inside out"),
+            (self.duplicates, "repeated tet", "removed"),
+            (self.pieces, "piece", "removed beside the largest"),
+            (self.tets_of_pieces, "tet", "removed with it"),
+            (self.unused, "particle", "removed that no tet uses"),
         ];
+        let items = items.map(|(count, noun, what)| {
+            let ending = if count == 1 { "" } else { "s" };
+            (count, format!("{noun}{ending} {what}"))
+        });
         let mut lines = items.into_iter().filter(|(count, _)| *count > 0);
         match lines.next() {
             None => f.write_str("nothing"),
@@ -376,8 +380,7 @@ mod tests {
         );
         assert_eq!(
             report.to_string(),
-            "3 tets without volume removed\n1 tets removed that were there twice\n\
-             1 particles removed that no tet uses"
+            "3 tets without volume removed\n1 repeated tet removed\n1 particle removed that no tet uses"
         );
     }
 

@@ -10,8 +10,7 @@
 //! use incise_xpbd::{Material, Solver, StepSettings};
 //!
 //! // A tet of rubber hangs from one corner.
-//! let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::NEG_Z];
-//! let rest = [rest[0], rest[2], rest[1], rest[3]];
+//! let rest = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::NEG_Z]; // in an order that makes its volume positive
 //! let mut solver = Solver::<f32>::new(&rest);
 //! let rubber = solver.add_material(Material {
 //!     young_modulus: 1e5,

@@ -1,7 +1,7 @@
 //! `cargo xtask paper`: tables and figures of the paper, with its values next to the measured ones.
 //!
 //! One module per table or figure, each an experiment. The paper's values are data in `printed`, its bodies are in
-//! `body`. Where the paper is ambiguous, every reading is run and the page says so.
+//! `paper_mesh`. Where the paper is ambiguous, every reading is run and the page says so.
 
 mod claims;
 mod colorings;

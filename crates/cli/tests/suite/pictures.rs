@@ -47,6 +47,24 @@ fn a_run_is_seen() {
     assert_ne!(read(&frames[0]), read(&frames[3]), "it falls");
 }
 
+/// A body that falls out of the picture is named, and the view of the message shows it.
+#[test]
+fn a_body_that_leaves_the_picture_is_named() {
+    let sandbox = Sandbox::with_scene();
+    let frames = ["--frames", "40", "--size", "48x32"];
+    let said = run(&sandbox, &frames);
+    let note = said
+        .lines()
+        .find(|line| line.starts_with("bodies leave the picture at frame "));
+    let note = note.unwrap_or_else(|| panic!("{said}"));
+    let view = note
+        .split_whitespace()
+        .find(|word| word.starts_with("--view="));
+    let view = view.unwrap_or_else(|| panic!("{note}"));
+    let said = run(&sandbox, &[&frames[..], &[view]].concat());
+    assert!(!said.contains("leave the picture"), "{said}");
+}
+
 #[test]
 fn about_fifty_frames_are_seen() {
     let sandbox = Sandbox::with_scene();

@@ -213,10 +213,25 @@ fn check_reports_the_number_of_checked_cuts() {
             "--no-pictures",
         ]);
         assert!(
-            text.contains(&format!("checked after each of {cuts} cuts")),
+            text.contains(&format!("checked after {cuts} cut")),
             "{text}"
         );
     }
+}
+
+#[test]
+fn a_stroke_after_the_last_frame_is_named() {
+    let sandbox = Sandbox::new();
+    sandbox.write("scene.toml", SCENE.replace("frame = 1", "frame = 7"));
+    let run = |frames| sandbox.incise(&["run", "scene.toml", "--no-pictures", "--frames", frames]);
+    let late = run("7").stderr;
+    assert!(
+        late.contains(
+            "stroke[0] begins at frame 7, and the run ends after 7 frames: --frames 8 includes it"
+        ),
+        "{late}"
+    );
+    assert!(!run("8").stderr.contains("stroke[0]"));
 }
 
 #[test]

@@ -111,6 +111,9 @@ const OUTSIDE_FRACTION: f64 = 0.01;
 /// slower without end.
 const MOST_GROWTH: u32 = 2;
 
+/// The part of the accuracy that rounding to single precision may use up. Discretization has the rest.
+const OF_ROUNDING: f64 = 1.0 / 3.0;
+
 /// Factor by which gravity may be weaker than on earth and still decide the precision.
 const WEAKEST: f64 = 1e4;
 
@@ -157,15 +160,25 @@ impl Island {
         self.spec.method == Method::Vbd && self.spec.two_level && self.spec.accuracy.is_some()
     }
 
-    /// Judges the accuracy of the present settings and notes warnings. O(tets log tets).
+    /// Judges the accuracy of the present settings and notes warnings. Those of the scene that were not reported yet stay. O(tets
+    /// log tets).
     pub(crate) fn judge_settings(&mut self) {
-        self.judged.warnings.clear();
+        let mut before = std::mem::take(&mut self.judged.warnings);
+        before.retain(|warning| warning.code.is_of_scene());
+        self.warn_of_settings();
+        self.judged.warnings.extend(before);
+    }
+
+    fn warn_of_settings(&mut self) {
         self.judged.misses_accuracy = false;
         if self.is_too_short_for_f32() && self.solver.host().is_single() {
-            let shortest = self.shortest_substep_of_f32();
+            let (substep, shortest) =
+                (self.settings.substep_time(), self.shortest_substep_of_f32());
+            let error = self.largest_rounding() * (shortest / substep).powi(2);
             let message = format!(
-                "a substep of {:.1e} s is too short for single precision, which needs {shortest:.1e} s: set precision = \"f64\"",
-                self.settings.substep_time()
+                "a substep of {substep:.1e} s is too short for single precision, which needs {shortest:.1e} s: rounding may change \
+                 forces at rest by {} of the weight; set precision = \"f64\", or fewer substeps",
+                warning::percent(error)
             );
             self.warn(WarningCode::ShortSubstepF32, message);
         }
@@ -188,7 +201,7 @@ impl Island {
             form,
         );
         let limit = self.judged.choice.and_then(|choice| choice.shortfall);
-        if let Some(Shortfall::Budget | Shortfall::Growth) = limit {
+        if let Some(Shortfall::Budget | Shortfall::Growth | Shortfall::Precision) = limit {
             judged.shortfall = limit;
         }
         let chosen = self.judged.choice.is_some();
@@ -235,7 +248,26 @@ impl Island {
         } else {
             1.0
         };
-        shortest_substep_of_f32(self.judged.size) * weakness.sqrt()
+        shortest_substep_of_f32(self.judged.size, self.largest_rounding()) * weakness.sqrt()
+    }
+
+    /// What rounding may change forces at rest by, as a fraction of the weight.
+    fn largest_rounding(&self) -> f64 {
+        OF_ROUNDING * self.spec.accuracy.unwrap_or(DEFAULT_ACCURACY)
+    }
+
+    /// The most substeps that cuts may raise a number to that was chosen.
+    fn most_substeps(&self) -> (u32, Shortfall) {
+        let growth = MOST_GROWTH.saturating_mul(self.judged.first_substeps);
+        if !self.solver.host().is_single() {
+            return (growth, Shortfall::Growth);
+        }
+        let single = whole(self.settings.time_step / self.shortest_substep_of_f32());
+        if single < growth {
+            (single, Shortfall::Precision)
+        } else {
+            (growth, Shortfall::Growth)
+        }
     }
 
     /// Takes a number of substeps, from which cuts raise it.
@@ -299,7 +331,7 @@ impl Island {
             && !self.spec.kappa_limit.is_finite()
         {
             let (chosen, choice) = substeps(asked, &self.spec, &self.solver, self.cuttable.mesh());
-            let most = MOST_GROWTH.saturating_mul(self.judged.first_substeps);
+            let (most, shortfall) = self.most_substeps();
             let taken = chosen.min(most).max(before);
             self.settings.substeps = taken;
             let ratio = f64::from(before) / f64::from(self.settings.substeps);
@@ -314,22 +346,25 @@ impl Island {
                     let mesh = self.cuttable.mesh();
                     let tets = demands(&self.spec, &self.solver, mesh, |_| true);
                     let mut limited = evaluate(tets, |_| taken, form);
-                    limited.shortfall = Some(Shortfall::Growth);
+                    limited.shortfall = Some(shortfall);
                     Some(limited)
                 }
                 choice => choice,
             };
+            let is_capped = |warning: &Warning| warning.code == WarningCode::SubstepsCapped;
+            let was_capped = self.judged.warnings.iter().any(is_capped);
             self.judge_settings();
+            if !was_capped {
+                // It is the small tets that need more, of which the next warning has the volume.
+                self.judged.warnings.retain(|warning| !is_capped(warning));
+            }
         }
         self.judged.outside.at_choice = self.judged.outside.outside;
         let fraction = self.judged.outside.outside / self.volume();
         if fraction > OUTSIDE_FRACTION {
-            let message = format!(
-                "after cuts {:.1}% of the volume is in tets too small for the accuracy wanted with {} substeps",
-                100.0 * fraction,
-                self.settings.substeps
-            );
-            self.warn(WarningCode::OutsideAccuracy, message);
+            let (substeps, choice) = (self.settings.substeps, self.judged.choice.as_ref());
+            let warning = warning::of_outside(&self.bodies, fraction, substeps, choice);
+            self.judged.warnings.push(warning);
         }
     }
 

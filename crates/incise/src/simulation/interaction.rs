@@ -115,15 +115,15 @@ impl Simulation {
     /// particles and those of attachments or other grabs are left out, also in the search for the nearest one.
     ///
     /// `compliance` applies to each particle, in m/N, as in [`AttachmentSpec`](crate::scene::AttachmentSpec): 0 is
-    /// rigid; with a large one the body can move away from the grab. VBD supports only 0.
+    /// rigid; with a large one the body can move away from the grab.
     ///
     /// Wakes the body. A cut through the grabbed part leaves both sides grabbed.
     ///
     /// O(particles); with a compliance of 0 the next step costs O(tets) more. On a device the positions are read back.
     ///
     /// # Errors
-    /// If a coordinate is not finite or beyond 1e9 m, `radius` or `compliance` is not from 0 to 1e9, the compliance is not
-    /// 0 with VBD, or the device is lost.
+    /// If a coordinate is not finite or beyond 1e9 m, `radius` or `compliance` is not from 0 to 1e9, or
+    /// the device is lost.
     ///
     /// # Example
     /// ```

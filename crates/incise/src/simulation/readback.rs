@@ -128,8 +128,9 @@ impl Simulation {
     /// Updates [`Simulation::positions`] if the state is on a device: waits for it and reads the positions back. On the
     /// CPU they are always current, and nothing happens.
     ///
-    /// A frame reads positions back by itself only if a stroke is due or it reports residuals. Energies, volume and
-    /// speed are summed on the device.
+    /// A frame reads the state back by itself if a stroke is due, the mesh is to be improved, a body is removed, contact
+    /// is declared or residuals are reported. In frames with contact `positions` keeps the state of the last call unless
+    /// residuals are reported. Energies, volume and speed are summed on the device.
     ///
     /// # Errors
     /// If the device is lost.
@@ -189,10 +190,11 @@ impl Simulation {
     /// Returns the island of bodies that solves a particle of [`Simulation::mesh`], and the particle's number there.
     /// O(1).
     ///
-    /// Bodies joined by distances are one island, every other body is its own; islands are numbered in the order of
+    /// Bodies joined by distances or contact are one island, every other body is its own; islands are numbered in the order of
     /// their first bodies. On a device the island is the index of its solver in `Simulation::device_solvers`: a
     /// renderer that draws the whole mesh from the buffers of the solvers looks up its particles here, all of them once
-    /// at the start and later those that [`Simulation::deltas`] append. The result for a particle never changes.
+    /// at the start and later those that [`Simulation::deltas`] append. The result for a particle changes only
+    /// when islands are joined ([`Simulation::add_distance`], [`Simulation::add_body`]) or a snapshot is restored.
     ///
     /// # Panics
     /// If the particle does not exist.

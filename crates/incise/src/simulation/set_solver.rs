@@ -5,9 +5,9 @@
 //! as a new simulation would build them, and the others are kept. All steps that can fail come first, so an error
 //! changes nothing.
 //!
-//! Cost: nothing for iterations, relaxation, form and the methods of XPBD; a pass over the tets for the time of a
-//! substep and the limit of kappa; clustering and coloring for their keys; a copy of the solvers for VBD and for
-//! another device.
+//! Cost: a pass over the tets for the time of a substep, the limit of kappa, and all that `auto` chooses substeps by;
+//! a measurement of the bodies with a budget; otherwise nothing for iterations, relaxation, form and the methods of XPBD;
+//! clustering and coloring for their keys; a copy of the solvers for VBD and for another device.
 
 use rayon::prelude::*;
 
@@ -58,8 +58,9 @@ impl Simulation {
     ///
     /// * `time_step`: attachments and strokes are defined by frames, so they move faster or slower; obstacles keep
     ///   their velocities; the simulated time continues.
-    /// * `substeps`, `max_substeps`: `auto` chooses again for the present tets if one of these, `time_step`, `accuracy`
-    ///   or `tet_solve` changes. Substeps that a body sets itself stay.
+    /// * `substeps`, `max_substeps`: `auto` chooses again for the present tets if one of these, `time_step`, `accuracy`,
+    ///   `budget_ms`, `method`, `iterations`, `relaxation`, `tet_solve`, `kappa_limit` or `backend` changes. Substeps that a
+    ///   body sets itself stay.
     /// * `kappa_limit`, or another time of a substep: tets are softened to the new limit, and others get the stiffness
     ///   of their material.
     /// * `clustering`, `coloring`, `merge_clusters`: clusters and colors of all tets are rebuilt.
@@ -72,8 +73,9 @@ impl Simulation {
     ///
     /// Any difference wakes all bodies. Equal settings change nothing.
     ///
-    /// The cost depends on the changed keys (see the header of this module in the source); `iterations`, `relaxation`,
-    /// `tet_solve` and methods other than VBD cost nothing.
+    /// The cost depends on the changed keys (see the header of this module in the source); with a given number of
+    /// substeps, `iterations`, `relaxation`, `tet_solve` and methods other than VBD cost nothing. With `auto` they cost a
+    /// pass over the tets, and with `budget_ms` the bodies are measured again.
     ///
     /// # Errors
     /// Returns the errors of [`Simulation::new`] for these settings, and one if `precision` differs. Nothing has

@@ -338,7 +338,10 @@ fn warnings_of_an_overlap(depth: f64, pinned: bool) -> Vec<Warning> {
     let mut warnings = Vec::new();
     for _ in 0..60 {
         simulation.step().unwrap();
-        warnings.extend_from_slice(simulation.report().warnings());
+        let new = simulation.report().warnings().iter();
+        // Those that can part are told at once that they start inside each other.
+        let is_start = |w: &&Warning| w.code == WarningCode::StartsInside;
+        warnings.extend(new.filter(|w| pinned || !is_start(w)).cloned());
     }
     if pinned {
         assert!(simulation.report().contact.unwrap().max_depth > 0.0);

@@ -49,6 +49,42 @@ fn builder() -> SimulationBuilder {
     builder
 }
 
+/// A box at rest presses with its weight, whatever accuracy is asked for: precision follows from it. With a small accuracy
+/// substeps are so many that single precision would lose a tenth of the weight.
+#[test]
+fn a_box_at_rest_presses_with_its_weight_at_any_accuracy() {
+    let of = |keys: &str| {
+        let text = format!(
+            "[world]\ngravity = [0, 0, -9.81]\nground = {{ height = 0.0, friction = 0.5 }}\n\
+             [report]\nquantities = [\"force\"]\n[solver]\ntime_step = 0.0166\n{keys}\n\
+             [[body]]\nshape = {{ kind = \"box\", tets = 500 }}\nscale = 0.2\nposition = [0, 0, 0.1]\n\
+             young_modulus = 1e6\ndamping = 0.01\n"
+        );
+        let mut simulation = Simulation::with_threads(&scene(&text), 1).unwrap();
+        let weight = 9.81 * 1000.0 * simulation.mesh().total_volume();
+        let mut sum = 0.0;
+        for frame in 0..40 {
+            simulation.step().unwrap();
+            if frame >= 20 {
+                let forces = &simulation.report().forces;
+                let ground = forces.iter().find(|f| f.kind == ForceKind::Ground);
+                sum -= ground.unwrap().force.force.z / 20.0;
+            }
+        }
+        let precision = simulation.report().precision;
+        ((sum / weight - 1.0).abs(), precision)
+    };
+    for accuracy in [0.1, 0.05, 0.02] {
+        let (error, precision) = of(&format!("accuracy = {accuracy}"));
+        assert!(error < accuracy / 3.0, "{accuracy}, {precision}: {error:e}");
+    }
+    // What the choice avoids.
+    let (single, _) = of("substeps = 200\nprecision = \"f32\"");
+    assert!(single > 0.03, "{single:e}");
+    assert_eq!(of("substeps = 200").1, "f64");
+    assert_eq!(of("substeps = 20").1, "f32");
+}
+
 /// The particles above a height.
 fn above(z: f64) -> Region {
     Region::half_space([0.0, 0.0, z], [0.0, 0.0, 1.0])

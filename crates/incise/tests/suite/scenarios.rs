@@ -238,6 +238,69 @@ fn bodies_that_start_inside_colliders_are_named_and_rise_slowly() {
     );
 }
 
+/// Bodies that start inside each other are named with the depth if they touch; bodies that lie on each other are not.
+#[test]
+fn bodies_that_start_inside_each_other_are_named() {
+    let of = |depth: f64, contact: &str| {
+        let text = |z: f64| {
+            format!(
+                "[[body]]\nshape = {{ kind = \"box\", tets = 300 }}\nscale = 0.2\nposition = [0.0, 0.0, {z}]\n"
+            )
+        };
+        let mut simulation = simulation(&scene(&format!(
+            "{contact}{}{}",
+            text(0.0),
+            text(0.2 - depth)
+        )));
+        let mut named = Vec::new();
+        for _ in 0..3 {
+            let warnings = simulation.step().unwrap().warnings().iter();
+            named.extend(
+                warnings
+                    .filter(|w| w.code == WarningCode::StartsInside)
+                    .cloned(),
+            );
+        }
+        named
+    };
+    let named = of(0.03, "[contact]\n");
+    assert_eq!(named.len(), 1, "{named:?}");
+    assert_eq!(named[0].location, "bodies 0, 1");
+    assert!(
+        named[0].message.contains("up to 0.03 m inside each other"),
+        "{}",
+        named[0]
+    );
+    assert!(of(0.0, "[contact]\n").is_empty());
+    assert!(of(0.03, "").is_empty());
+}
+
+/// A collider that fits between the particles of a body is named: across the way in which it moves.
+#[test]
+fn colliders_that_pass_between_particles_are_named() {
+    let body = "[[body]]\nshape = { kind = \"box\", tets = 300 }\nscale = 0.2\n";
+    let of = |collider: &str| {
+        let text = format!("{body}[[collider]]\ncenter = [0.0, 0.0, 0.5]\n{collider}");
+        let mut simulation = simulation(&scene(&text));
+        let warnings = simulation.step().unwrap().warnings().to_vec();
+        let thin = |w: &&Warning| w.code == WarningCode::ThinCollider;
+        warnings.iter().find(thin).map(|w| w.message.clone())
+    };
+    let wall = |velocity: &str| {
+        let sides = "kind = \"box\"\nhalf_extents = [0.3, 0.3, 0.005]\n";
+        of(&format!("{sides}velocity = {velocity}\n"))
+    };
+    let needle = of("kind = \"sphere\"\nradius = 0.005\n").unwrap();
+    assert!(
+        needle.starts_with("collider[0] is 0.01 m thick"),
+        "{needle}"
+    );
+    assert_eq!(of("kind = \"sphere\"\nradius = 0.1\n"), None);
+    assert!(wall("[0.5, 0, 0]").is_some(), "edge on");
+    assert_eq!(wall("[0, 0, -0.5]"), None);
+    assert_eq!(wall("[0, 0, 0]"), None);
+}
+
 /// A body in mm without `scale` is a thousand times as large and collapses under its weight: it is named.
 #[test]
 fn a_body_that_its_weight_crushes_is_named() {

@@ -85,31 +85,34 @@ fn a_handle_wakes_what_it_holds_while_it_moves() {
     assert!((x.z - rest.z - 1.0).abs() < 1e-6);
 }
 
-/// A wall comes from far; nothing may sleep before it, or it would pass through.
+/// A wall comes from far: a body sleeps until it is near, and does not let it pass through.
 #[test]
-fn a_moving_collider_keeps_bodies_awake() {
+fn a_moving_collider_wakes_a_body_that_it_comes_near() {
     let solver = "[solver]\nsleep = { time = 0.05 }\n";
     let sphere = body("sphere", 200, [0.0; 3]);
     let wall = |velocity: f64| {
         format!(
-            "[[collider]]\nkind = \"plane\"\npoint = [-0.8, 0, 0]\nnormal = [1, 0, 0]\nvelocity = [{velocity}, 0, 0]\n"
+            "[[collider]]\nkind = \"plane\"\npoint = [-1.6, 0, 0]\nnormal = [1, 0, 0]\nvelocity = [{velocity}, 0, 0]\n"
         )
     };
     let run = |velocity: f64| {
         let text = format!("{solver}{sphere}{}", wall(velocity));
         let mut simulation = simulation(&scene(&text));
+        let mut slept = 0;
         for _ in 0..40 {
-            simulation.step().unwrap();
+            let report = simulation.step().unwrap();
+            slept += usize::from(report.bodies[0].asleep == Some(true));
         }
         let low = simulation.positions().iter().map(|x| x.x);
         let asleep = simulation.report().bodies[0].asleep;
-        (asleep, low.fold(f64::INFINITY, f64::min))
+        (slept, asleep, low.fold(f64::INFINITY, f64::min))
     };
-    assert_eq!(run(0.0).0, Some(true));
-    let (asleep, low) = run(1.0);
-    // The wall is at -0.8 + 40 · 0.016 m; single precision.
+    assert_eq!(run(0.0).1, Some(true));
+    let (slept, asleep, low) = run(2.0);
+    assert!(slept > 2, "{slept} frames");
+    // The wall is at -1.6 + 2 · 40 · 0.016 m; single precision.
     assert_eq!(asleep, Some(false));
-    assert!(low > -0.16 - 1e-6, "{low}");
+    assert!(low > -0.32 - 1e-6, "{low}");
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use incise::report::{BodyReport, Shortfall};
 use incise::scene::{Precision, Substeps};
-use incise::{Scene, Simulation, Warning, WarningCode};
+use incise::{Scene, Simulation, WarningCode};
 use serde_json::Value;
 
 use crate::support::{body, plane, scene, simulation, state};
@@ -309,8 +309,12 @@ fn limited_growth_after_a_cut_is_reported() {
     assert!(choice.substeps_wanted > after.substeps);
     assert_eq!(choice.shortfall, Some(Shortfall::Growth));
     assert!(choice.expected_error > 0.1, "{choice:?}");
-    let is_capped = |warning: &&Warning| warning.code == WarningCode::SubstepsCapped;
-    let warning = report.warnings().iter().find(is_capped).unwrap();
+    // One warning, with the volume of these tets: most of the body is solved as well as before.
+    let codes: Vec<_> = report.warnings().iter().map(|w| w.code).collect();
+    assert_eq!(codes, [WarningCode::OutsideAccuracy]);
+    let [warning] = report.warnings() else {
+        unreachable!("one code")
+    };
     assert!(warning.message.contains("set substeps = "), "{warning}");
     assert!(!warning.message.contains("max_substeps"), "{warning}");
 }
