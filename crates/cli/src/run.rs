@@ -25,23 +25,14 @@ pub(crate) fn run(arguments: &RunArguments) -> Result<(), Failure> {
     in_pool(arguments.threads, || simulate(arguments))
 }
 
-/// Names the strokes that begin after the last frame.
-#[expect(clippy::print_stderr, reason = "warnings of a run go to stderr")]
-fn print_late_strokes(scene: &Scene, frames: u64) {
-    for (number, stroke) in scene.stroke.iter().enumerate() {
-        let first = stroke.first_frame();
-        if first >= frames {
-            let enough = stroke.last_frame() + 1;
-            let these = count(
-                usize::try_from(frames).unwrap_or(usize::MAX),
-                "frame",
-                "frames",
-            );
-            eprintln!(
-                "warning: stroke[{number}] begins at frame {first}, and the run ends after {these}: --frames {enough} includes it"
-            );
-        }
-    }
+/// A line for each stroke that begins after the last frame.
+fn late_strokes(scene: &Scene, frames: u64) -> impl Iterator<Item = String> + '_ {
+    let late = scene.stroke.iter().enumerate();
+    let late = late.filter(move |(_, stroke)| stroke.first_frame() >= frames);
+    late.map(|(number, stroke)| {
+        let (first, enough) = (stroke.first_frame(), stroke.last_frame() + 1);
+        format!("stroke[{number}] begins at frame {first}, after the last frame: --frames {enough} includes it")
+    })
 }
 
 /// Runs a function on a pool of its own with this number of threads, or on the common one.
@@ -77,9 +68,6 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
     let jsonl = arguments.jsonl.as_deref();
     let mut output = Output::create(folder, jsonl, &scene, frames, pictures)?;
 
-    if !arguments.quiet {
-        print_late_strokes(&scene, frames);
-    }
     let kappa = simulation.kappa();
     let mut summary = Summary::new(simulation.report());
     let mut checked = 0;
@@ -133,6 +121,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
         if let Some(note) = simulation.backend_note() {
             print(note)?;
         }
+        late_strokes(&scene, frames).try_for_each(print)?;
         if arguments.check {
             print(format_args!(
                 "checked after {}: mesh, volume at rest, masses, clusters, colors, pieces",

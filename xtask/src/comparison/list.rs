@@ -30,7 +30,7 @@ pub(super) enum Program {
     },
 }
 
-const SCALAR: &str = "the same constraints in the same form, in clusters of one tet; its iteration is the pass alone and \
+const SCALAR: &str = "the block form of the same constraints, in clusters of one tet; its iteration is the pass alone and \
     keeps multipliers, its frame is not measured";
 
 pub(super) const PEERS: &[Peer] = &[
@@ -53,7 +53,7 @@ pub(super) const PEERS: &[Peer] = &[
     Peer {
         id: "pbat",
         what: "XPBD, stable neo-Hookean, block form (pbatoolkit)",
-        caveat: "the same energy and form; each step looks for contacts of one vertex, which is in its frame, not in its \
+        caveat: "the same energy, in block form; each step looks for contacts of one vertex, which is in its frame, not in its \
             iteration",
         precision: Precision::F64,
         compiles: false,

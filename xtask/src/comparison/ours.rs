@@ -28,7 +28,7 @@ pub(super) struct Ours {
     pub(super) ms_frame: f64,
 }
 
-/// Measures this solver, with clusters of ten as in scenes.
+/// Measures this solver with the clusters and the form that scenes have by default.
 pub(super) fn ours(cells: [usize; 3], frames: u32, precision: Precision) -> anyhow::Result<Ours> {
     match precision {
         Precision::F64 => in_precision::<f64>(cells, frames),
@@ -51,7 +51,7 @@ fn in_precision<R: Real>(cells: [usize; 3], frames: u32) -> anyhow::Result<Ours>
         .fold(f64::INFINITY, f64::min)
         + 1e-9;
     let mut solver = body::<R>(&mesh, rubber, |x| x.x < held)?;
-    let schedule = schedule(&mesh, "serial:10")?;
+    let schedule = schedule(&mesh, "pressure:10")?;
     let substep = StepSettings {
         gravity: Some(DVec3::new(0.0, 0.0, -9.81)),
         ..StepSettings::new(1.0 / 60.0 / f64::from(SUBSTEPS))

@@ -223,15 +223,13 @@ fn check_reports_the_number_of_checked_cuts() {
 fn a_stroke_after_the_last_frame_is_named() {
     let sandbox = Sandbox::new();
     sandbox.write("scene.toml", SCENE.replace("frame = 1", "frame = 7"));
-    let run = |frames| sandbox.incise(&["run", "scene.toml", "--no-pictures", "--frames", frames]);
-    let late = run("7").stderr;
+    let run = |frames| sandbox.good(&["run", "scene.toml", "--no-pictures", "--frames", frames]);
+    let late = run("7");
     assert!(
-        late.contains(
-            "stroke[0] begins at frame 7, and the run ends after 7 frames: --frames 8 includes it"
-        ),
+        late.contains("stroke[0] begins at frame 7, after the last frame: --frames 8 includes it"),
         "{late}"
     );
-    assert!(!run("8").stderr.contains("stroke[0]"));
+    assert!(!run("8").contains("stroke[0]"));
 }
 
 #[test]
