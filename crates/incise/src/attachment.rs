@@ -13,8 +13,8 @@ use crate::backend::AnySolver;
 use crate::collider::rotation;
 use crate::region::particles;
 use crate::scene::{AttachmentSpec, along};
+use crate::text::counted;
 use crate::validate::{coordinates, value, within};
-use crate::warning::counted;
 
 /// What supports a particle.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

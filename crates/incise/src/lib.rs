@@ -63,6 +63,7 @@ mod solid_blade;
 mod solver_backend;
 mod strokes;
 mod substeps;
+mod text;
 mod tool;
 mod validate;
 mod vbd;

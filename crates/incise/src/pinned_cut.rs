@@ -18,7 +18,8 @@ use incise_cutting::{BoundaryTriangle, CutDelta, FaceTag};
 use incise_mesh::{Bounds, ParticleId};
 
 use crate::island::Island;
-use crate::warning::{Warning, WarningCode, box_text, counted};
+use crate::text::counted;
+use crate::warning::{Warning, WarningCode, box_text};
 
 /// A cut that pinned particles keep closed.
 #[derive(Clone, Debug)]

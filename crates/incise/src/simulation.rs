@@ -43,8 +43,9 @@ use crate::report::{
 use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, Quantity, StrokeSpec};
 use crate::strokes::Timeline;
+use crate::text::counted;
 use crate::validate::value;
-use crate::warning::{Warning, WarningCode, counted};
+use crate::warning::{Warning, WarningCode};
 use crate::{Error, Event, Scene, collider, contacts, distance};
 
 pub use builder::{Body, BodyHandle, SimulationBuilder};

@@ -8,8 +8,8 @@ use crate::Error;
 use crate::live_blade::{LiveBlade, long_enough};
 use crate::region::Solid;
 use crate::scene::{Region, StrokeSpec};
+use crate::text::counted;
 use crate::validate::{coordinates, direction, value};
-use crate::warning::counted;
 
 /// The geometry that a stroke cuts with, checked.
 #[derive(Clone, Debug)]

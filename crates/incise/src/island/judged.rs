@@ -15,6 +15,7 @@ use crate::method::tet_solve;
 use crate::scene::{Method, Substeps};
 use crate::solver_backend::Measures;
 use crate::substeps::{Choice, Shortfall, evaluate};
+use crate::text::percent;
 use crate::warning::{self, Warning, WarningCode};
 
 /// Chosen settings of an island, and what is known of their accuracy.
@@ -178,7 +179,7 @@ impl Island {
             let message = format!(
                 "a substep of {substep:.1e} s is too short for single precision, which needs {shortest:.1e} s: rounding may change \
                  forces at rest by {} of the weight; set precision = \"f64\", or fewer substeps",
-                warning::percent(error)
+                percent(error)
             );
             self.warn(WarningCode::ShortSubstepF32, message);
         }
