@@ -192,8 +192,8 @@ fn narrowest(collider: &Collider) -> Option<f64> {
     }
 }
 
-/// The warnings about obstacles that fit between the particles of a body's surface. O(boundary triangles) for each body
-/// if there are such obstacles.
+/// The warnings about obstacles that fit between the particles of a body's surface. O(boundary triangles) if there are
+/// obstacles other than planes.
 fn thin_colliders(
     scene: &Scene,
     settings: &StepSettings,
@@ -208,19 +208,21 @@ fn thin_colliders(
         return warnings;
     }
     let positions = &cuttable.mesh().positions;
+    // By body the length of all edges and their number.
+    let mut edges: BTreeMap<usize, (f64, u32)> = BTreeMap::new();
+    for triangle in cuttable.boundary() {
+        let corners = triangle.particles;
+        let body = joined.body_of_particle[corners[0].index()] as usize;
+        let [a, b, c] = corners.map(|p| positions[p.index()]);
+        let (length, count) = edges.entry(body).or_default();
+        *length += a.distance(b) + b.distance(c) + c.distance(a);
+        *count += 3;
+    }
     for (body, particles) in bodies(joined) {
-        if joined.fixed[particles.clone()].iter().all(|fixed| *fixed) {
+        if joined.fixed[particles].iter().all(|fixed| *fixed) {
             continue;
         }
-        let (mut length, mut count) = (0.0, 0);
-        for triangle in cuttable.boundary() {
-            let corners = triangle.particles;
-            if particles.contains(&corners[0].index()) {
-                let [a, b, c] = corners.map(|p| positions[p.index()]);
-                length += a.distance(b) + b.distance(c) + c.distance(a);
-                count += 3;
-            }
-        }
+        let (length, count) = edges.get(&body).copied().unwrap_or_default();
         let edge = length / f64::from(count.max(1));
         let of_body = thin.iter().filter(|(_, thickness)| *thickness < edge);
         warnings.extend(of_body.map(|&(number, thickness)| {
