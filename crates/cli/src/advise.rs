@@ -1,10 +1,13 @@
 //! `incise advise`: the most accurate settings of a scene's solver that meet a time budget on this machine.
 
+use std::time::Duration;
+
 use comfy_table::Table;
 use comfy_table::presets::UTF8_FULL_CONDENSED;
 use incise::advise::{
-    Advice, AdviseSettings, Measured, ReferenceKind, ReferenceSummary, default_frames,
+    Advice, AdviseSettings, Measured, ReferenceKind, ReferenceSummary, advise_with, default_frames,
 };
+use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::args::AdviseArguments;
 use crate::failure::Failure;
@@ -16,7 +19,14 @@ pub(crate) fn advise(arguments: &AdviseArguments) -> Result<(), Failure> {
     let frames = arguments.frames.unwrap_or_else(|| default_frames(&scene));
     let mut question = AdviseSettings::new(arguments.budget_ms, frames);
     question.threads = arguments.threads.map(usize::from);
-    let advice = incise::advise::advise(&scene, &question);
+    let spinner = ProgressBar::new_spinner();
+    let style = ProgressStyle::with_template("{spinner} {msg}  {elapsed}");
+    spinner.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+    spinner.enable_steady_tick(Duration::from_millis(200));
+    let advice = advise_with(&scene, &question, &mut |step: &str| {
+        spinner.set_message(step.to_owned());
+    });
+    spinner.finish_and_clear();
     let advice = advice.map_err(|error| located(error, arguments.scene.as_deref()))?;
     if arguments.json {
         let json = serde_json::to_string(&advice).map_err(|error| Failure::Run(error.into()))?;

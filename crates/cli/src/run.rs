@@ -143,7 +143,7 @@ pub(crate) fn default_frames(scene: &Scene) -> u64 {
 
 /// Prints a warning to stderr.
 #[expect(clippy::print_stderr, reason = "warnings of a run go to stderr")]
-fn print_warning(warning: &Warning) {
+pub(crate) fn print_warning(warning: &Warning) {
     eprintln!("warning: {warning}");
 }
 

@@ -12,7 +12,7 @@ use serde_json::Value;
 use crate::args::SceneArguments;
 use crate::failure::Failure;
 use crate::print::{count, print};
-use crate::run::{load, located};
+use crate::run::{load, located, print_warning};
 
 pub(crate) fn scene(arguments: &SceneArguments) -> Result<(), Failure> {
     if let Some(path) = &arguments.check {
@@ -28,10 +28,15 @@ pub(crate) fn scene(arguments: &SceneArguments) -> Result<(), Failure> {
     }
 }
 
-/// Reads a scene and sets up its simulation, which finds every error that `incise run` would find at its start.
+/// Reads a scene and simulates its first frame, which finds every error and every warning that `incise run` would find at
+/// its start.
 fn check(path: &Path) -> Result<(), Failure> {
     let scene = load(Some(path))?;
-    let simulation = Simulation::new(&scene).map_err(|error| located(error, Some(path)))?;
+    let in_file = |error| located(error, Some(path));
+    let mut simulation = Simulation::new(&scene).map_err(in_file)?;
+    for warning in simulation.step().map_err(in_file)?.warnings() {
+        print_warning(warning);
+    }
     let bodies = count(scene.body.len(), "body", "bodies");
     let tets = count(simulation.report().tets, "tet", "tets");
     let strokes = count(scene.stroke.len(), "stroke", "strokes");

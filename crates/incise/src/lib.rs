@@ -65,6 +65,7 @@ mod strokes;
 mod substeps;
 mod text;
 mod tool;
+mod unused_keys;
 mod validate;
 mod vbd;
 mod volume;

@@ -35,6 +35,7 @@ pub use collider::{ColliderSpec, RotationSpec};
 pub use contact::{ContactPairs, ContactSpec};
 pub use cutting::CuttingSpec;
 pub use distance::{DistanceSpec, EndSpec};
+use lines::line_of_message;
 pub use lines::{line_of, location};
 pub use method::{Integrator, Method, TetSolve};
 pub use preset::Preset;
@@ -395,12 +396,13 @@ impl Scene {
     /// unknown key, the nearest known one.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
         let mut scene: Self = toml::from_str(text).map_err(|error| {
-            let line = error
-                .span()
-                .map(|span| text[..span.start.min(text.len())].matches('\n').count() + 1);
+            let span = error.span();
+            let line = span.clone();
+            let line = line.map(|span| line_of_message(text, span.start, error.message()));
+            let named = span.and_then(|span| text.get(span));
             Error::Parse {
                 line,
-                message: in_scene_words(error.message()),
+                message: in_scene_words(error.message(), named.unwrap_or_default()),
             }
         })?;
         scene.solver = scene.solver.with_defaults(text)?;

@@ -46,7 +46,7 @@ use crate::strokes::Timeline;
 use crate::text::counted;
 use crate::validate::value;
 use crate::warning::{Warning, WarningCode};
-use crate::{Error, Event, Scene, collider, contacts, distance};
+use crate::{Error, Event, Scene, collider, contacts, distance, unused_keys};
 
 pub use builder::{Body, BodyHandle, SimulationBuilder};
 pub use snapshot::Snapshot;
@@ -428,9 +428,13 @@ impl Simulation {
             let warning = Warning::of_missed_stroke(missed, nearest);
             self.state.report.warnings.push(warning);
         }
-        let has_ground = self.state.scene.world.ground.is_some();
-        if self.state.clock.next_frame == 0 && has_ground && self.state.gravity.is_none() {
-            self.state.report.warnings.push(Warning::of_no_gravity());
+        if self.state.clock.next_frame == 0 {
+            let has_ground = self.state.scene.world.ground.is_some();
+            if has_ground && self.state.gravity.is_none() {
+                self.state.report.warnings.push(Warning::of_no_gravity());
+            }
+            let of_keys = unused_keys::warnings(&self.state.solver, &self.state.islands);
+            self.state.report.warnings.extend(of_keys);
         }
         let of_strokes = self.state.timeline.take_warnings();
         self.state.report.warnings.extend(of_strokes);

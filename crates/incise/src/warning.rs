@@ -47,8 +47,14 @@ pub enum WarningCode {
     ThinCollider,
     /// A body collapses under its own weight.
     TooHeavy,
+    /// More than 1% of a body's volume has stayed in inverted tets.
+    Inverted,
     /// The scene has a ground and says nothing about gravity, so nothing falls onto it.
     NoGravity,
+    /// A key of the scene changes nothing with the settings beside it.
+    UnusedKey,
+    /// A frame lasts longer than a second.
+    LongFrame,
     /// A stroke has ended without meeting a tet.
     StrokeMissed,
     /// A stroke has cut where pinned particles keep both sides together.
@@ -141,8 +147,8 @@ impl Warning {
     /// The warning about a body of `size` m that the pressure of its weight, `weight` times its Young's modulus, crushes.
     pub(crate) fn of_weight(body: usize, size: f64, weight: f64) -> Self {
         let message = format!(
-            "it is {} m large, and the pressure of its weight is {weight:.0} times its Young's modulus, so it collapses: set \
-             scale = 0.001 if its lengths are in mm, or raise young_modulus",
+            "it is {} m large, and the pressure of its weight is {weight:.0} times its Young's modulus, so it collapses: raise \
+             young_modulus, or set scale = 0.001 if its lengths are in mm",
             rounded(size)
         );
         Self::new(WarningCode::TooHeavy, &[body], message)
@@ -154,6 +160,28 @@ impl Warning {
             code: WarningCode::NoGravity,
             message: "there is a ground and no gravity, so nothing falls onto it: set gravity = [0.0, 0.0, -9.81], or [0.0, 0.0, 0.0] if bodies are to float".into(),
             location: "world".into(),
+        }
+    }
+
+    /// The warning about a key of `[solver]` that changes nothing, for a `reason`.
+    pub(crate) fn of_unused_key(key: &str, reason: &str) -> Self {
+        Self {
+            code: WarningCode::UnusedKey,
+            message: format!("it has no effect here: {reason}"),
+            location: format!("solver.{key}"),
+        }
+    }
+
+    /// The warning about a frame of so many seconds.
+    pub(crate) fn of_long_frame(time_step: f64) -> Self {
+        let message = format!(
+            "a frame lasts {} s: time_step is in s, so that 16 ms are 0.016",
+            rounded(time_step)
+        );
+        Self {
+            code: WarningCode::LongFrame,
+            message,
+            location: "solver.time_step".into(),
         }
     }
 

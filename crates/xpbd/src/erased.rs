@@ -73,6 +73,7 @@ erased! {
     fn density_of(&self, tet: usize) -> f64;
     fn kappa_of(&self, tet: usize, substep_time: f64) -> f64;
     fn max_speed(&self) -> f64;
+    fn inverted_fraction(&self) -> f64;
     fn softened(&self) -> Softened;
     fn handle_count(&self) -> usize;
     fn handle(&self, handle: u32) -> Pose;

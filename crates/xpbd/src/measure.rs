@@ -98,6 +98,16 @@ impl<R: Float> Solver<R> {
         volume
     }
 
+    /// Returns the fraction of the volume at rest in tets that have no volume or a negative one; 0 without tets. O(tets).
+    #[must_use]
+    pub fn inverted_fraction(&self) -> f64 {
+        let volumes = &self.tets.rest_volumes;
+        let inverted = (0..self.tet_count()).filter(|&t| self.gradient(t).determinant() <= 0.0);
+        let volume: f64 = inverted.map(|t| volumes[t]).sum();
+        let all: f64 = volumes.iter().sum();
+        if all > 0.0 { volume / all } else { 0.0 }
+    }
+
     /// Returns the largest speed of a particle in m/s.
     #[must_use]
     pub fn max_speed(&self) -> f64 {

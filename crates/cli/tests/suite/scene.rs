@@ -114,3 +114,16 @@ fn a_wrong_scene_is_refused_with_line_and_key() {
     assert_eq!(sandbox.incise(&["scene"]).code, 2);
     assert_eq!(sandbox.incise(&["scene", "--schema", "--defaults"]).code, 2);
 }
+
+/// Problems of a valid scene are known before a long run.
+#[test]
+fn the_check_of_a_scene_warns() {
+    let sandbox = Sandbox::with_scene();
+    let region = "fixed = [{ sphere = { center = [9, 9, 9], radius = 1 } }]";
+    sandbox.write("scene.toml", SCENE.replace("young_modulus = 1e4", region));
+    let outcome = sandbox.incise(&["scene", "--check", "scene.toml"]);
+    assert_eq!(outcome.code, 0, "{}", outcome.stderr);
+    assert!(outcome.stdout.contains(": valid: "), "{}", outcome.stdout);
+    let warning = "warning: body[0].fixed[0]: the region contains nothing";
+    assert!(outcome.stderr.contains(warning), "{}", outcome.stderr);
+}

@@ -176,6 +176,18 @@ pub fn default_frames(scene: &Scene) -> u32 {
 /// # Errors
 /// [`Error::Value`] if a value of the question lies outside its range; the errors of [`Simulation::new`] for the scene.
 pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error> {
+    advise_with(scene, question, &mut |_| {})
+}
+
+/// Calls `progress` with a description before each step of [`advise`], which may take minutes.
+///
+/// # Errors
+/// Those of [`advise`].
+pub fn advise_with(
+    scene: &Scene,
+    question: &AdviseSettings,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Advice, Error> {
     let AdviseSettings {
         budget_ms,
         frames,
@@ -193,6 +205,7 @@ pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error>
     }
     let tets = Simulation::new(scene)?.mesh().tets.len();
     let substeps = accurate_substeps(scene)?;
+    progress("computing the reference");
     let reference = reference_of(scene, tets, frames, substeps)?;
     let mut specs = vec![scene.solver.clone()];
     specs.extend(
@@ -212,6 +225,12 @@ pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error>
             report: crate::scene::ReportSpec::default(),
             ..run
         };
+        progress(&format!(
+            "trying setting {} of {}: {}",
+            i + 1,
+            specs.len(),
+            name(spec)
+        ));
         match Motion::of(&run, frames.min(2), threads) {
             Ok(probe) if i == 0 || probe.fastest_ms() <= FAR * budget_ms => kept.push((i, run)),
             Ok(probe) => left_out.push(format!(
@@ -224,8 +243,13 @@ pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error>
         }
     }
     let mut motions: Vec<Option<Motion>> = vec![None; kept.len()];
-    for _ in 0..ROUNDS {
-        for ((_, run), motion) in kept.iter().zip(&mut motions) {
+    for round in 1..=ROUNDS {
+        for (k, ((i, run), motion)) in (1..).zip(kept.iter().zip(&mut motions)) {
+            progress(&format!(
+                "measuring setting {k} of {}, round {round} of {ROUNDS}: {}",
+                kept.len(),
+                name(&specs[*i])
+            ));
             let again = Motion::of(run, frames, threads)?;
             match motion {
                 Some(motion) => motion.keep_fastest(&again),

@@ -2,7 +2,7 @@
 //!
 //! Settings are judged when they are chosen, and again after cuts: small tets may need more substeps than were chosen, or
 //! fewer may fit a time budget. What misses the accuracy wanted is a warning. Cost: O(tets log tets) where substeps are
-//! chosen, O(changed tets) after a cut.
+//! chosen, O(changed tets) after a cut, and O(tets) four times a second of simulated time for what is inverted.
 
 use glam::DVec3;
 use incise_mesh::TetMesh;
@@ -42,6 +42,8 @@ pub(crate) struct Judged {
     /// Whether it was reported that slivers hold much of the elastic energy.
     #[cfg_attr(feature = "save", serde(default))]
     pub(crate) sliver_energy_reported: bool,
+    #[cfg_attr(feature = "save", serde(default))]
+    inversion: Inversion,
     /// Warnings for the next report.
     pub(crate) warnings: Vec<Warning>,
     /// Change of kappa by the last cut, if it is reported.
@@ -61,10 +63,21 @@ impl Judged {
             outside: OutsideVolume::default(),
             misses_accuracy: false,
             sliver_energy_reported: false,
+            inversion: Inversion::default(),
             warnings: Vec::new(),
             cut_kappa: None,
         }
     }
+}
+
+/// How long much of a body has been inverted.
+#[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
+struct Inversion {
+    /// Since it was looked for in s.
+    time: f64,
+    was_much: bool,
+    is_reported: bool,
 }
 
 /// Cost of an island and its share of a time budget.
@@ -120,6 +133,10 @@ const WEAKEST: f64 = 1e4;
 
 /// The part of the elastic energy that slivers may hold without a warning.
 const SLIVER_ENERGY: f64 = 0.1;
+
+/// The part of the volume that may be in inverted tets without a warning, and the time in s from one look at it to the next.
+const INVERTED: f64 = 0.01;
+const INVERSION_TIME: f64 = 0.25;
 
 /// Energy below which nothing is judged, as a part of stiffness times volume: a strain of 3e-5, which is near rounding in a
 /// sliver.
@@ -398,6 +415,33 @@ impl Island {
             self.warn(WarningCode::NotConverged, message);
         }
         self.judged.misses_accuracy = misses;
+    }
+
+    /// Warns when much of the body has stayed inverted. O(tets) four times a second of simulated time; positions on a device
+    /// are not known.
+    pub(super) fn judge_inversion(&mut self) {
+        let Inversion {
+            time,
+            was_much,
+            is_reported,
+        } = &mut self.judged.inversion;
+        *time += self.settings.time_step;
+        if *time < INVERSION_TIME || self.solver.is_on_device() {
+            return;
+        }
+        let part = self.solver.host().inverted_fraction();
+        let is_much = part > INVERTED;
+        let stays = is_much && *was_much;
+        let is_new = stays && !*is_reported;
+        (*time, *was_much, *is_reported) = (0.0, is_much, stays);
+        if is_new {
+            let message = format!(
+                "{} of the volume is in tets that have stayed inverted for {INVERSION_TIME} s, where its shape is wrong: the load is \
+                 too large for the material; raise young_modulus, or spread loads and fixed regions over more of the body",
+                percent(part)
+            );
+            self.warn(WarningCode::Inverted, message);
+        }
     }
 
     /// Warns, once, when slivers hold much of a reported elastic energy.

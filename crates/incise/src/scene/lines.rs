@@ -1,4 +1,6 @@
-//! [`line_of`]: the line of a key in the text of a scene, for errors about its value.
+//! [`line_of`] and [`line_of_message`]: the line that an error about the text of a scene is about.
+//!
+//! Cost: that of reading the text once more.
 
 use std::path::Path;
 
@@ -57,6 +59,28 @@ pub fn location(path: &Path, error: &Error) -> Option<String> {
     let text = std::fs::read_to_string(path).ok()?;
     let line = line_of(&text, &error.key()?)?;
     Some(format!("{}: line {line}", path.display()))
+}
+
+/// The line, counted from 1, of a message of the TOML reader about the text from `start` on. Of a list of tables with kinds the
+/// reader knows the first line only, so an unknown key is looked for below it; it counts if only one line has it. O(text).
+pub(super) fn line_of_message(text: &str, start: usize, message: &str) -> usize {
+    let before = text.get(..start).unwrap_or(text);
+    let first = before.matches('\n').count();
+    let mut lines = text.lines().map(str::trim_start).skip(first);
+    let is_head = lines.next().is_some_and(|line| line.starts_with('['));
+    let unknown = message.strip_prefix("unknown field `").filter(|_| is_head);
+    let Some((key, _)) = unknown.and_then(|names| names.split_once('`')) else {
+        return first + 1;
+    };
+    let is_key = |line: &str| {
+        let rest = line.strip_prefix(key).map(str::trim_start);
+        rest.is_some_and(|rest| rest.starts_with('='))
+    };
+    let mut with_key = (first + 2..).zip(lines).filter(|(_, line)| is_key(line));
+    match (with_key.next(), with_key.next()) {
+        (Some((line, _)), None) => line,
+        _ => first + 1,
+    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,8 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::names::similar;
+
 /// Number of substeps of a frame: in a scene a number, or `"auto"`.
 ///
 /// ```
@@ -86,11 +88,10 @@ impl<'de> Deserialize<'de> for Substeps {
             fn visit_str<E: serde::de::Error>(self, name: &str) -> Result<Substeps, E> {
                 match name {
                     "auto" => Ok(Substeps::Auto),
-                    // A number in quotes is no misspelled word.
-                    _ if name.parse::<f64>().is_ok() => {
-                        Err(E::invalid_value(Unexpected::Str(name), &self))
+                    _ if similar(name, ["auto"]).is_some() => {
+                        Err(E::unknown_variant(name, &["auto"]))
                     }
-                    _ => Err(E::unknown_variant(name, &["auto"])),
+                    _ => Err(E::invalid_value(Unexpected::Str(name), &self)),
                 }
             }
         }

@@ -10,22 +10,25 @@ use crate::names::similar;
 
 /// A message of the TOML reader about a wrong type or value, a missing key, or an unknown name, in the words of scene files;
 /// other messages stay. An unknown name comes with the known one that is most similar, with the tables that have such a key,
-/// or with all known ones.
-pub(super) fn in_scene_words(message: &str) -> String {
+/// or with all known ones. `named` is the text that the message is about.
+pub(super) fn in_scene_words(message: &str, named: &str) -> String {
     let message = message.trim_end().replace('\n', " ");
+    if message == "duplicate key" {
+        return format!("the key '{named}' is there twice");
+    }
     if let Some(names) = message.strip_prefix("unexpected keys in table: ") {
         // From a table with one of several sets of keys: `unexpected keys in table: a, available keys: b, c`.
         let (unknown, known) = names
             .split_once(", available keys: ")
             .unwrap_or((names, ""));
         let first = unknown.split(", ").next().unwrap_or(unknown);
-        return unknown_name(first, &known.split(", ").collect::<Vec<_>>());
+        return unknown_name(first, &known.split(", ").collect::<Vec<_>>(), named);
     }
     if message.starts_with("unknown") {
         // ``unknown field `a`, expected `b` or `c` ``.
         let mut names = message.split('`').skip(1).step_by(2);
         if let Some(unknown) = names.next() {
-            return unknown_name(unknown, &names.collect::<Vec<_>>());
+            return unknown_name(unknown, &names.collect::<Vec<_>>(), named);
         }
     }
     if message.starts_with("wanted exactly 1 element") {
@@ -54,7 +57,7 @@ pub(super) fn in_scene_words(message: &str) -> String {
     message
 }
 
-fn unknown_name(unknown: &str, known: &[&str]) -> String {
+fn unknown_name(unknown: &str, known: &[&str], named: &str) -> String {
     let known: Vec<&str> = known
         .iter()
         .copied()
@@ -64,7 +67,8 @@ fn unknown_name(unknown: &str, known: &[&str]) -> String {
         return format!("unknown key or value '{unknown}': did you mean '{name}'?");
     }
     let tables = tables_with(unknown);
-    if !tables.is_empty() {
+    let is_here = tables.iter().any(|table| named.starts_with(table));
+    if !tables.is_empty() && !is_here {
         let tables = tables.join(" or ");
         return format!("unknown key '{unknown}' here: it belongs to {tables}");
     }
@@ -72,6 +76,9 @@ fn unknown_name(unknown: &str, known: &[&str]) -> String {
         return format!("unknown key or value '{unknown}'");
     }
     let known = known.join("', '");
+    if is_here {
+        return format!("this kind has no key '{unknown}': known are '{known}'");
+    }
     format!("unknown key or value '{unknown}': known are '{known}'")
 }
 
@@ -188,6 +195,10 @@ mod tests {
             ("[[body]]\nfixed = 3", "expected a list, found 3"),
             ("[[stroke]]\nkind = 3", "expected text in quotes, found 3"),
             (
+                "[solver]\nsubsteps = \"many\"",
+                "expected a number of substeps or \"auto\", found \"many\"",
+            ),
+            (
                 "[solver]\nsubsteps = \"10\"",
                 "expected a number of substeps or \"auto\", found \"10\"",
             ),
@@ -227,6 +238,33 @@ mod tests {
             .contains("'snap'")
         );
         assert!(message("[world\n").starts_with("line 1: "));
+    }
+
+    /// Tables with a kind are read as a whole; the line is still that of the key.
+    #[test]
+    fn a_key_that_a_kind_does_not_have_is_named_with_its_line() {
+        let plane =
+            "[[stroke]]\nkind = \"plane\"\nframe = 1\npoint = [0, 0, 0]\nnormal = [0, 0, 1]\n";
+        for (more, words) in [
+            (
+                "snp = 1",
+                "line 6: unknown key or value 'snp': did you mean 'snap'?",
+            ),
+            (
+                "solid = {}",
+                "line 6: this kind has no key 'solid': known are 'frame'",
+            ),
+            (
+                "[[stroke]]\nkind = \"plane\"\n frame = 1\n  snp=1",
+                "line 9: unknown key",
+            ),
+        ] {
+            let said = message(&format!("{plane}{more}"));
+            assert!(said.starts_with(words), "{said}");
+        }
+        let inline =
+            message("[[body]]\nmesh = \"a.vtk\"\nshape = { kind = \"box\", tets = 9, size = 1 }");
+        assert!(inline.starts_with("line 3: "), "{inline}");
     }
 
     #[test]
@@ -271,6 +309,17 @@ mod tests {
         }
     }
 
+    #[test]
+    fn a_key_that_is_there_twice_is_named() {
+        for (text, key) in [
+            ("[contact]\nfriction = 0.1\nfriction = 0.2", "friction"),
+            ("[contact]\nfriction = 0.1\n[contact]", "contact"),
+        ] {
+            let said = message(text);
+            assert_eq!(said, format!("line 3: the key '{key}' is there twice"));
+        }
+    }
+
     /// A list would be read as the values of the keys in their order.
     #[test]
     fn a_rotation_is_no_list() {
@@ -298,7 +347,7 @@ mod tests {
     #[test]
     fn other_messages_stay() {
         for text in ["invalid basic string", "unknown", "invalid type: what"] {
-            assert_eq!(in_scene_words(text), text);
+            assert_eq!(in_scene_words(text, ""), text);
         }
     }
 }

@@ -187,6 +187,23 @@ fn a_replaced_tet_keeps_its_material() {
     );
 }
 
+/// What counts is the volume at rest, whatever tets have become.
+#[test]
+fn the_inverted_fraction_is_that_of_the_volume_at_rest() {
+    let mut solver = two_tets::<f64>();
+    let volumes = [0, 1].map(|t| volume(TETS[t].map(|p| REST[p as usize])).abs());
+    let all = volumes[0] + volumes[1];
+    assert_eq!(solver.inverted_fraction(), 0.0);
+    solver.set_position(0, DVec3::ONE);
+    within(
+        "the first",
+        solver.inverted_fraction() - volumes[0] / all,
+        1e-14,
+    );
+    solver.set_position(4, DVec3::ZERO);
+    assert_eq!(solver.inverted_fraction(), 1.0);
+}
+
 /// Lists of all particles are what the functions of one particle say: of a fixed one, an attached one, one without mass,
 /// and free ones.
 #[test]
