@@ -24,8 +24,9 @@
 //! twins. A search is a refit of the trees, a query for each vertex that is due and for each feature edge, one for each
 //! triangle that has moved, and a short one for each other vertex of parts that have, on all threads but for the triangles. A
 //! delta costs what the boundary lost and gained. The first search also looks for vertices that start inside of other
-//! parts, among all tets. The search after a cut is for all vertices; it builds a tree over the new triangles, and over all
-//! of them once these are more than a quarter.
+//! parts, among all tets. The search after a cut is for the vertices of triangles that came or went and those near them, and
+//! for all where that is much of the surface or parts do not touch themselves; it builds a tree over the new triangles, and
+//! over all of them once these are more than a quarter.
 
 use glam::DVec3;
 use incise_cutting::{BoundaryTriangle, CutDelta, CuttableMesh};
@@ -76,6 +77,8 @@ const FAST: f64 = 0.01;
 const WHOLE: f64 = 2.0;
 /// Where more than this part of all vertices have moved out of their reserve, all are searched for.
 const MOST: f64 = 0.02;
+/// Where a cut has changed the surface around more than this part of all vertices, all are searched for.
+const CHANGED: f64 = 0.2;
 /// The part of the skin within which surfaces count as near. The rest saves searches: bodies at rest shake by less.
 const NEAR: f64 = 0.5;
 /// The motion of a part as a whole is fitted to at least so many of its vertices, and to all if it has fewer.
@@ -183,6 +186,10 @@ pub struct ContactDetector {
     reserve: Reserve,
     /// Whether the next update has to search for all vertices.
     search_is_due: bool,
+    /// The corners of the triangles that came or went since the last search.
+    changed: Vec<u32>,
+    /// Whether the surface vertices are others than when they were listed.
+    vertices_are_due: bool,
     /// Whether the next search has to look for vertices inside of other parts everywhere. Later ones know which they
     /// are: a vertex gets inside through the outer tets, which the search looks at.
     location_is_due: bool,
@@ -262,6 +269,8 @@ impl ContactDetector {
             parts: Vec::new(),
             reserve: Reserve::default(),
             search_is_due: true,
+            changed: Vec::new(),
+            vertices_are_due: true,
             location_is_due: true,
             room: Room::default(),
         };
@@ -294,6 +303,7 @@ impl ContactDetector {
         self.main_slots = 0;
         self.fresh_is_due = true;
         self.search_is_due = true;
+        self.changed.clear();
         self.location_is_due = true;
         self.inside.clear();
         self.deep.clear();
@@ -361,7 +371,12 @@ impl ContactDetector {
         }
         self.fresh_is_due = true;
         self.features_are_due = true;
-        self.search_is_due = true;
+        self.vertices_are_due = true;
+        let triangles = delta.surface_removed.iter().chain(&delta.surface_added);
+        let corners = triangles.flat_map(|triangle| triangle.particles);
+        self.changed.extend(corners.map(|p| p.0));
+        // Improvement moves particles. Where parts do not touch themselves, those that came apart may touch anywhere.
+        self.search_is_due |= delta.is_improvement() || !self.settings.self_contact;
     }
 
     /// Takes the last cut or removal back; `mesh` is the one before it. Pairs that it ended do not come back, those that
@@ -385,6 +400,7 @@ impl ContactDetector {
         });
         let is_known = |p: &u32| (*p as usize) < delta.particles_before;
         self.inverted.retain(is_known);
+        self.changed.clear();
         // Those that are left are searched for.
         self.face_candidates.clear();
         self.sightings.clear();
@@ -417,9 +433,7 @@ impl ContactDetector {
         );
         assert_eq!(self.body_of.len(), particles, "all deltas were applied");
 
-        if self.search_is_due {
-            self.list_vertices(state);
-        }
+        self.update_vertices(state);
         self.survey(state);
         let near = self.near(state);
         std::mem::swap(&mut self.pairs, &mut self.room.last_pairs);
@@ -506,14 +520,22 @@ impl ContactDetector {
                 |p: &u32| !is_pushed_through(&self.surface, state, self.mean_edge, ParticleId(*p));
             let back = self.inverted.iter().filter(|p| is_back(p));
             back.chain(retired).copied().for_each(look);
+            if !self.changed.is_empty() {
+                self.look_after_change(&mut due);
+            }
         }
         let is_due = |least: Due| self.vertices.iter().any(|&p| due[p as usize] >= least);
         let has_moved = is_due(Due::Moved);
+        let is_changed = !self.changed.is_empty();
         let have_parts = !self.reserve.used_up_pairs().is_empty();
         let asked = Asked {
             all,
-            vertices: self.search_is_due || have_parts || is_due(Due::Search),
-            edges: self.search_is_due || have_parts || has_moved || !retired.is_empty(),
+            vertices: self.search_is_due || is_changed || have_parts || is_due(Due::Search),
+            edges: self.search_is_due
+                || is_changed
+                || have_parts
+                || has_moved
+                || !retired.is_empty(),
             has_moved: has_moved && !all,
             have_parts: have_parts && !all,
         };
@@ -522,6 +544,21 @@ impl ContactDetector {
             self.reserve.mark();
         }
         asked
+    }
+
+    /// Notes what a cut may have changed besides its own surface: the candidates with a triangle that is gone or beside one,
+    /// and vertices inside other parts or beside inverted tets.
+    fn look_after_change(&self, due: &mut [Due]) {
+        let mut look = |p: u32| due[p as usize] = due[p as usize].max(Due::Search);
+        self.inside.iter().for_each(|(p, _)| look(p.0));
+        self.deep.iter().for_each(|(p, _)| look(p.0));
+        self.inverted.iter().for_each(|p| look(*p));
+        for contact in &self.face_candidates {
+            let [vertex, corners @ ..] = contact.particles;
+            if corners.iter().any(|&p| due[p as usize] == Due::Moved) {
+                due[vertex as usize] = due[vertex as usize].max(Due::Search);
+            }
+        }
     }
 
     /// Notes the vertices that have moved out of their reserve, which starts over for them; whether all are due.
@@ -548,6 +585,9 @@ impl ContactDetector {
             for (_, (_, &p)) in vertices().filter(|(_, (part, _))| is_asked(*part)) {
                 due[p as usize] = Due::Moved;
             }
+        }
+        for &p in &self.changed {
+            due[p as usize] = Due::Moved;
         }
         for (i, &p) in self.vertices.iter().enumerate() {
             if due[p as usize] == Due::Moved {
@@ -600,9 +640,7 @@ impl ContactDetector {
     /// If there are fewer positions or velocities than particles, or a delta was left out.
     #[must_use]
     pub fn intervals(&mut self, state: &ContactState<'_>) -> u32 {
-        if self.search_is_due {
-            self.list_vertices(state);
-        }
+        self.update_vertices(state);
         let skin = self.near_skin();
         let ahead = self.settings.reach * self.mean_edge + skin;
         let step = |p: u32| state.velocities[p as usize] * state.frame_time;
@@ -677,6 +715,64 @@ impl ContactDetector {
         intervals
     }
 
+    /// Brings the list of the surface vertices up to date. After a cut, what is known of those that stay is kept, unless it
+    /// has changed much of the surface.
+    fn update_vertices(&mut self, state: &ContactState<'_>) {
+        if !self.search_is_due && self.vertices_are_due {
+            self.changed.sort_unstable();
+            self.changed.dedup();
+            let most = CHANGED * self.vertices.len() as f64;
+            // The trees are built anew, and the mean edge changes with them.
+            self.search_is_due = self.changed.len() as f64 > most
+                || self.is_rebuilding_due()
+                || !self.keep_vertices(state);
+        }
+        if self.search_is_due {
+            self.list_vertices(state);
+            self.reserve.clear();
+        }
+        self.vertices_are_due = false;
+    }
+
+    /// Lists the surface vertices again and keeps what is known of those that stay. False if parts were joined, which have no
+    /// common history.
+    fn keep_vertices(&mut self, state: &ContactState<'_>) -> bool {
+        let (vertices, parts) = (self.vertices.clone(), self.parts.clone());
+        self.list_vertices(state);
+        let place = |p: u32| {
+            let x = state.positions[p as usize];
+            [x, x + state.velocities[p as usize] * state.frame_time]
+        };
+        let numbers = self.parts.iter().map(|&part| part as usize + 1).max();
+        // By part what it was before; a part without a vertex of before is searched for as a whole.
+        let mut origins = vec![NONE; numbers.unwrap_or(0)];
+        let mut known = vertices.iter().zip(parts).enumerate().peekable();
+        let mut stayed = Vec::with_capacity(self.vertices.len());
+        for (&p, &part) in self.vertices.iter().zip(&self.parts) {
+            while known.next_if(|(_, (before, _))| **before < p).is_some() {}
+            let same = known.next_if(|(_, (before, _))| **before == p);
+            stayed.push(match same {
+                Some((i, (_, before))) => {
+                    let origin = &mut origins[part as usize];
+                    if *origin != NONE && *origin != before {
+                        return false;
+                    }
+                    *origin = before;
+                    Some(i)
+                }
+                None => {
+                    self.changed.push(p);
+                    None
+                }
+            });
+        }
+        self.changed.sort_unstable();
+        self.changed.dedup();
+        let new = self.vertices.iter().map(|&p| place(p));
+        self.reserve.keep(stayed.into_iter().zip(new), &origins);
+        true
+    }
+
     /// The surface vertices and their pieces.
     fn list_vertices(&mut self, state: &ContactState<'_>) {
         self.vertices.clear();
@@ -687,7 +783,6 @@ impl ContactDetector {
             self.parts
                 .push(triangle.map_or(0, |triangle| state.pieces.piece_of(triangle.tet)));
         }
-        self.reserve.clear();
     }
 
     /// Looks at all parts: which are near each other, and what they and their vertices have moved by.
@@ -789,7 +884,10 @@ impl ContactDetector {
             self.features.list(&self.surface, rest);
             self.features_are_due = false;
         }
-        if self.search_is_due || self.room.order.len() != self.vertices.len() {
+        if self.search_is_due
+            || !self.changed.is_empty()
+            || self.room.order.len() != self.vertices.len()
+        {
             self.order_vertices();
         }
         if asked.has_moved {
@@ -798,6 +896,12 @@ impl ContactDetector {
         self.query(state, asked);
         self.collect(state);
         self.search_is_due = false;
+        self.changed.clear();
+    }
+
+    /// Whether new triangles are so many that the main tree is built again.
+    fn is_rebuilding_due(&self) -> bool {
+        self.surface.slot_count() - self.main_slots > self.main_slots / FRESH
     }
 
     /// Boxes and normals of the triangles at the present positions.
@@ -848,7 +952,7 @@ impl ContactDetector {
     /// Brings the trees up to date: refits, and builds what new triangles ask for.
     fn sync_trees(&mut self, state: &ContactState<'_>) {
         let slots = self.surface.slot_count();
-        if slots - self.main_slots > self.main_slots / FRESH {
+        if self.is_rebuilding_due() {
             let numbers = self.surface.compact(state.mesh);
             self.fresh_pairs.renumber(&self.surface, &numbers);
             self.mean_edge = self.surface.mean_edge(&state.mesh.mesh().positions);

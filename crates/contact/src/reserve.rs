@@ -116,6 +116,47 @@ impl Reserve {
         self.used_up.clear();
     }
 
+    /// Takes over new numbers of vertices and parts: for each vertex its number before, or where a new one is, and for each
+    /// part the one that it came from, or [`NONE`]. Parts of the same origin are near each other from now on.
+    pub(crate) fn keep(
+        &mut self,
+        vertices: impl Iterator<Item = (Option<usize>, [DVec3; 2])>,
+        origins: &[u32],
+    ) {
+        let (places, beside) = (
+            std::mem::take(&mut self.places),
+            std::mem::take(&mut self.beside),
+        );
+        for (before, place) in vertices {
+            let before = before.filter(|&i| i < places.len());
+            self.places.push(before.map_or(place, |i| places[i]));
+            self.beside
+                .push(before.map_or_else(Beside::default, |i| beside[i]));
+        }
+        let of_origin = |origin: usize| {
+            let numbers = origins.iter().enumerate();
+            numbers.filter_map(move |(i, &from)| (from as usize == origin).then_some(i))
+        };
+        let pairs = std::mem::take(&mut self.pairs);
+        for pair in &pairs {
+            for one in of_origin(pair.parts[0]) {
+                for other in of_origin(pair.parts[1]) {
+                    let mut pair = PartPair {
+                        parts: [one, other],
+                        ..*pair
+                    };
+                    if one > other {
+                        pair.parts.swap(0, 1);
+                        pair.back.swap(0, 1);
+                    }
+                    self.pairs.push(pair);
+                }
+            }
+        }
+        self.pairs.sort_unstable_by_key(|pair| pair.parts);
+        self.parts.clear();
+    }
+
     /// What vertex `i` has moved by since the last update; nothing in the first one.
     pub(crate) fn moved(&self, i: usize, places: [DVec3; 2]) -> [DVec3; 2] {
         let before = self.places.get(i).copied().unwrap_or(places);
