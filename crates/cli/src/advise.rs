@@ -161,6 +161,7 @@ fn words(advice: &Advice) -> String {
 /// Formats a value with two or three digits.
 fn digits(value: f64) -> String {
     match value.abs() {
+        0.0 => "0".to_owned(),
         ..0.001 => format!("{value:.1e}"),
         ..0.1 => format!("{value:.4}"),
         ..10.0 => format!("{value:.2}"),
