@@ -179,7 +179,7 @@ pub fn advise(scene: &Scene, question: &AdviseSettings) -> Result<Advice, Error>
     advise_with(scene, question, &mut |_| {})
 }
 
-/// Calls `progress` with a description before each step of [`advise`], which may take minutes.
+/// Does what [`advise`] does, and calls `progress` with a description before each of its steps: all may take minutes.
 ///
 /// # Errors
 /// Those of [`advise`].
