@@ -722,7 +722,7 @@ impl ContactDetector {
             self.changed.sort_unstable();
             self.changed.dedup();
             let most = CHANGED * self.vertices.len() as f64;
-            // The trees are built anew, and the mean edge changes with them.
+            // Where the main tree is built again, the mean edge changes, too.
             self.search_is_due = self.changed.len() as f64 > most
                 || self.is_rebuilding_due()
                 || !self.keep_vertices(state);
