@@ -396,13 +396,14 @@ impl Scene {
     /// unknown key, the nearest known one.
     pub fn from_toml(text: &str) -> Result<Self, Error> {
         let mut scene: Self = toml::from_str(text).map_err(|error| {
-            let span = error.span();
-            let line = span.clone();
-            let line = line.map(|span| line_of_message(text, span.start, error.message()));
-            let named = span.and_then(|span| text.get(span));
+            let message = error.message();
+            let line = error
+                .span()
+                .map(|span| line_of_message(text, span.start, message));
+            let named = error.span().and_then(|span| text.get(span));
             Error::Parse {
                 line,
-                message: in_scene_words(error.message(), named.unwrap_or_default()),
+                message: in_scene_words(message, named.unwrap_or_default()),
             }
         })?;
         scene.solver = scene.solver.with_defaults(text)?;
