@@ -150,7 +150,8 @@ impl RunArguments {
 #[derive(Debug, Args)]
 #[command(
     after_help = "Example: incise sweep scene.toml --set solver.substeps=4,8,16 --set body[0].young_modulus=1e4,1e5 --out study\n\n\
-    The table is sweep.csv: the values of the keys, the outcome, the last reported value of each quantity, and times in ms. \
+    The table is sweep.csv: the values of the keys, the outcome, the last reported value of each quantity, \
+    forces with their largest amount, and times in ms. \
     Machines share a study by --shard; see docs/cluster.md."
 )]
 pub(crate) struct SweepArguments {

@@ -5,7 +5,8 @@
 //! was run; a cell of another scene is refused. The table is made from the files alone, so it is equal for any number of
 //! shares, except for its times.
 //!
-//! A row has the last reported value of each quantity, and medians and worst values of times. Cost: that of the runs.
+//! A row has the last reported value of each quantity, the largest amount of each force, and medians and worst values of
+//! times. Cost: that of the runs.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -15,6 +16,8 @@ use std::time::Instant;
 
 use anyhow::{Context, anyhow};
 use incise::mesh_io::write_atomically;
+use incise::report::ForceReport;
+use incise::scene::Quantity;
 use incise::{Error, FrameReport, Scene, Simulation};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::{Deserialize, Serialize};
@@ -211,7 +214,7 @@ fn line<'a>(fields: impl Iterator<Item = &'a str>) -> String {
     quoted.collect::<Vec<_>>().join(",") + "\n"
 }
 
-/// Runs a scene; returns the outcome and the last value of each quantity.
+/// Runs a scene; returns the outcome, the last value of each quantity, and the largest amount of each force.
 fn simulate(scene: &Scene, frames: u64) -> Result<(String, BTreeMap<String, Value>), Error> {
     let mut simulation = Simulation::new(scene)?;
     let mut quantities = BTreeMap::new();
@@ -220,6 +223,11 @@ fn simulate(scene: &Scene, frames: u64) -> Result<(String, BTreeMap<String, Valu
     for _ in 0..frames {
         let report = simulation.step()?;
         note(report, &mut quantities, &mut times);
+        if scene.report.quantities.contains(&Quantity::Force)
+            && report.frame.is_multiple_of(scene.report.every)
+        {
+            note_forces(&report.forces, &mut quantities);
+        }
         if let Some(warning) = report
             .warnings()
             .iter()
@@ -269,6 +277,32 @@ fn note(
             }
             _ => {}
         }
+    }
+}
+
+/// Notes the forces of a frame in N: components, which are 0 for what no longer touches, and the largest amount so far.
+fn note_forces(forces: &[ForceReport], quantities: &mut BTreeMap<String, Value>) {
+    let old = quantities
+        .iter_mut()
+        .filter(|(name, _)| name.starts_with("force."));
+    old.filter(|(name, _)| !name.ends_with(".largest"))
+        .for_each(|(_, value)| *value = Value::from(0.0));
+    for entry in forces {
+        let kind = serde_json::to_value(entry.kind).unwrap_or_default();
+        let mut name = format!(
+            "force.{}.{}",
+            kind.as_str().unwrap_or_default(),
+            entry.index
+        );
+        if let Some(other) = entry.other {
+            name += &format!(".{other}");
+        }
+        let force = entry.force.force;
+        for (axis, component) in ["x", "y", "z"].into_iter().zip(force.to_array()) {
+            quantities.insert(format!("{name}.{axis}"), Value::from(component));
+        }
+        let largest = quantities.entry(format!("{name}.largest")).or_default();
+        *largest = Value::from(force.length().max(largest.as_f64().unwrap_or(0.0)));
     }
 }
 

@@ -90,6 +90,81 @@ fn rows_are_those_of_single_runs() {
     }
 }
 
+/// A box falls on the edge of another one and tips over it: the last force is that of the last frame, 0 where nothing
+/// touches any more, and the largest is that of all frames.
+#[test]
+fn forces_have_their_last_and_their_largest_value() {
+    let sandbox = Sandbox::new();
+    sandbox.write(
+        "scene.toml",
+        r#"
+[world]
+gravity = [0, 0, -9.81]
+ground = { height = -0.1 }
+[contact]
+[report]
+every = 1
+quantities = ["force"]
+[[body]]
+shape = { kind = "box", tets = 200 }
+scale = 0.2
+[[body]]
+shape = { kind = "box", tets = 200 }
+scale = 0.2
+position = [0.16, 0, 0.201]
+"#,
+    );
+    let study = "sweep scene.toml --set solver.substeps=8,16 --frames 30 --quiet --out study";
+    sandbox.good(&study.split(' ').collect::<Vec<_>>());
+    let (header, rows) = table(&sandbox.read("study/sweep.csv"));
+    let column = |name: &str| header.iter().position(|known| known == name).unwrap();
+    for row in &rows {
+        sandbox.write(
+            "one.toml",
+            sandbox.read("scene.toml") + &format!("[solver]\nsubsteps = {}\n", row[0]),
+        );
+        let run = "run one.toml --frames 30 --quiet --no-pictures --out one";
+        sandbox.good(&run.split(' ').collect::<Vec<_>>());
+        let text = sandbox.read("one/frames.jsonl");
+        let frames: Vec<Value> = text
+            .lines()
+            .map(|l| serde_json::from_str(l).unwrap())
+            .collect();
+        for (name, kind, of_bodies) in [
+            ("force.ground.0", "ground", false),
+            ("force.contact.0.1", "contact", true),
+        ] {
+            let vectors: Vec<[f64; 3]> = frames
+                .iter()
+                .map(|frame| {
+                    let forces = frame["forces"].as_array().unwrap();
+                    let entry = forces.iter().find(|force| force["kind"] == kind);
+                    assert!(entry.is_none_or(|entry| entry.get("other").is_some() == of_bodies));
+                    [0, 1, 2]
+                        .map(|k| entry.map_or(0.0, |force| force["force"][k].as_f64().unwrap()))
+                })
+                .collect();
+            let field = |part: &str| {
+                row[column(&format!("{name}.{part}"))]
+                    .parse::<f64>()
+                    .unwrap()
+            };
+            assert_eq!(["x", "y", "z"].map(field), vectors[29], "{name}");
+            let amounts = vectors
+                .iter()
+                .map(|[x, y, z]| (x * x + y * y + z * z).sqrt());
+            let largest = amounts.fold(0.0, f64::max);
+            assert!(
+                largest > 0.0 && (field("largest") / largest - 1.0).abs() < 1e-12,
+                "{name}"
+            );
+            if of_bodies {
+                assert_eq!(vectors[29], [0.0; 3], "the boxes still touch");
+            }
+        }
+    }
+}
+
 #[test]
 fn shares_give_the_table_of_one_run() {
     let sandbox = sandbox();
