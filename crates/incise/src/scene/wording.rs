@@ -82,26 +82,44 @@ fn unknown_name(unknown: &str, known: &[&str], named: &str) -> String {
     format!("unknown key or value '{unknown}': known are '{known}'")
 }
 
-/// The tables of a scene with a key of this name, as they begin in a file.
+/// The tables of a scene with a key of this name, as they begin in a file; if there is none, the tables within these.
 fn tables_with(key: &str) -> Vec<String> {
     let schema = schema();
-    let tables = schema["properties"].as_object().into_iter().flatten();
-    let with_key = tables.filter_map(|(table, of)| {
-        let is_list = of["type"] == "array";
-        let reference = [&of["items"]["$ref"], &of["allOf"][0]["$ref"]];
-        let name = reference.into_iter().find_map(Value::as_str)?;
-        let of = &schema["definitions"][name.rsplit('/').next()?];
-        let kinds = of["oneOf"].as_array().into_iter().flatten();
-        let has_key = |of: &Value| of["properties"].get(key).is_some();
-        (has_key(of) || kinds.into_iter().any(has_key)).then(|| match is_list {
+    let (mut tables, mut within) = (Vec::new(), Vec::new());
+    for (table, part) in schema["properties"].as_object().into_iter().flatten() {
+        let table = match part["type"] == "array" {
             true => format!("[[{table}]]"),
             false => format!("[{table}]"),
-        })
-    });
-    let mut with_key: Vec<String> = with_key.collect();
+        };
+        for (name, part) in keys_of(&schema, part) {
+            if name == key {
+                tables.push(table.clone());
+            } else if keys_of(&schema, part).any(|(name, _)| name == key) {
+                within.push(format!("'{name}' in {table}"));
+            }
+        }
+    }
+    let mut with_key = if tables.is_empty() { within } else { tables };
     // The schema's order depends on features of the JSON library.
     with_key.sort_unstable();
+    with_key.dedup();
     with_key
+}
+
+/// The keys of all kinds of the table that a part of a schema refers to, with their parts; none if it refers to none.
+fn keys_of<'a>(
+    schema: &'a Value,
+    part: &'a Value,
+) -> impl Iterator<Item = (&'a String, &'a Value)> {
+    let reference = [&part["items"]["$ref"], &part["allOf"][0]["$ref"]];
+    let reference = reference.into_iter().find_map(Value::as_str);
+    let name = reference.and_then(|reference| reference.rsplit('/').next());
+    let of = name.map_or(&Value::Null, |name| &schema["definitions"][name]);
+    let kinds = of["oneOf"].as_array().into_iter().flatten();
+    std::iter::once(of)
+        .chain(kinds)
+        .filter_map(|of| of["properties"].as_object())
+        .flatten()
 }
 
 /// What was wanted: `f64` and the like, or words already.
@@ -301,6 +319,11 @@ mod tests {
                 "[world]\nfriction = 1",
                 "friction",
                 "[[collider]] or [contact]",
+            ),
+            (
+                "[[body]]\ntoughness = 20",
+                "toughness",
+                "'solid' in [[stroke]]",
             ),
         ] {
             let said = message(text);
