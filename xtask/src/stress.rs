@@ -378,10 +378,10 @@ impl Energy {
         let energy = simulation.report().energy?;
         let (mesh, positions) = (simulation.mesh(), simulation.positions());
         let least = SLIVER * mesh.total_volume() / mesh.tets.len() as f64;
-        let rest = energy.kinetic + energy.gravity;
+        let not_elastic = energy.kinetic + energy.gravity;
         let mut joules = Joules {
-            all: rest + energy.elastic,
-            without_slivers: rest,
+            all: not_elastic + energy.elastic,
+            without_slivers: not_elastic,
             inverted: 0.0,
         };
         for (t, tet) in mesh.tets.iter().enumerate() {
