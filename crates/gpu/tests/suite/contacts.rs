@@ -347,16 +347,14 @@ fn both(
     let host = run(make());
     let start = make();
     let allowed = (!is_lavapipe(gpu)).then(|| {
-        let others: Vec<_> = with_rounding(&start).map(run).collect();
-        let off = |k| {
-            let off = others
-                .iter()
-                .map(|other| group_distances(other, &host, group)[k]);
-            off.map(|off| MARGIN * off).fold(1e-6, f64::max)
-        };
-        (0..start.particle_count().div_ceil(group))
-            .map(off)
-            .collect()
+        let least = vec![1e-6; start.particle_count().div_ceil(group)];
+        with_rounding(&start).fold(least, |mut allowed, other| {
+            let off = group_distances(&run(other), &host, group);
+            for (allowed, off) in allowed.iter_mut().zip(off) {
+                *allowed = f64::max(*allowed, MARGIN * off);
+            }
+            allowed
+        })
     });
     ([device.host().unwrap().clone(), host], allowed)
 }
