@@ -121,8 +121,10 @@ impl CuttableMesh {
         !is_bounded && self.around(particle).next().is_some()
     }
 
-    /// Whether a particle is of a mesh as it was made, not of a cut.
-    pub(crate) fn is_original(&self, particle: ParticleId) -> bool {
+    /// Returns whether a particle is of the mesh as it was made, or of one that was appended, not of a cut. O(appended
+    /// meshes).
+    #[must_use]
+    pub fn is_original(&self, particle: ParticleId) -> bool {
         let mut ranges = self.original.iter();
         ranges.any(|&[first, end]| (first..end).contains(&particle.index()))
     }

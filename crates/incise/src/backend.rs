@@ -6,7 +6,7 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 use incise_cutting::{CutDelta, CuttableMesh};
 use incise_graph::Schedule;
 use incise_mesh::{ParticleId, TetId, TetMesh};
@@ -16,6 +16,7 @@ use web_time::Instant;
 use crate::Error;
 use crate::compute_device::ComputeDevice;
 use crate::device::{Device, GpuContext};
+use crate::masses::Masses;
 use crate::report::{Milliseconds, milliseconds};
 use crate::scene::{Method, Precision, Quantity, SolverSpec};
 use crate::solver_backend::{LastSubstep, Measures, SolverBackend};
@@ -115,6 +116,7 @@ impl AnySolver {
         &mut self,
         delta: &CutDelta,
         cuttable: &CuttableMesh,
+        masses: &mut Masses,
     ) -> Result<(), Error> {
         let mesh = cuttable.mesh();
         let solver = self.edit()?;
@@ -143,22 +145,7 @@ impl AnySolver {
             solver.move_tet(tet.from.index(), tet.to.index());
         }
         solver.truncate_tets(delta.tets_after());
-        let mut star = Vec::new();
-        let touched = touched(delta);
-        let regions = if delta.is_improvement() {
-            regions(delta, &touched)
-        } else {
-            Vec::new()
-        };
-        let momentum = |region: &Vec<ParticleId>| Momentum::of(solver, region);
-        let momenta: Vec<Momentum> = regions.iter().map(momentum).collect();
-        for &p in &touched {
-            let mass = mass(solver, cuttable, p, &mut star);
-            solver.set_mass_in_star(p.index(), mass, &mut star.iter().map(|tet| tet.index()));
-        }
-        for (region, before) in regions.iter().zip(momenta) {
-            before.restore(solver, region);
-        }
+        masses.apply_delta(delta, cuttable, solver);
         // Particles that lost all their tets stay where they are.
         for p in delta.deleted.iter().flat_map(|tet| tet.corners) {
             if cuttable.around(p).next().is_none() {
@@ -240,7 +227,12 @@ impl AnySolver {
     }
 
     /// Recomputes masses, corners and what a step would solve, and compares; for tests and on request.
-    pub(crate) fn check(&self, cuttable: &CuttableMesh, schedule: &Schedule) -> Result<(), Error> {
+    pub(crate) fn check(
+        &self,
+        cuttable: &CuttableMesh,
+        schedule: &Schedule,
+        masses: &Masses,
+    ) -> Result<(), Error> {
         let (mesh, solver) = (cuttable.mesh(), self.host());
         let sizes = (solver.particle_count(), solver.tet_count());
         if sizes != (mesh.positions.len(), mesh.tets.len()) {
@@ -253,15 +245,7 @@ impl AnySolver {
                 return Err(Error::Inconsistent(what));
             }
         }
-        let mut star = Vec::new();
-        for p in 0..mesh.positions.len() {
-            let fresh = mass(solver, cuttable, ParticleId::new(p), &mut star);
-            let stored = solver.mass(p);
-            if (stored - fresh).abs() > 1e-12 * fresh {
-                let what = format!("particle {p} has mass {stored} instead of {fresh}");
-                return Err(Error::Inconsistent(what));
-            }
-        }
+        masses.check(cuttable, solver)?;
         let layout = solver.check_layout(schedule);
         layout.map_err(|error| Error::Inconsistent(error.to_string()))?;
         self.backend().check(schedule)
@@ -375,210 +359,4 @@ impl<R: Real> SolverBackend for Backend<R> {
 /// Whether a tet is too stiff for a limit.
 fn exceeds(solver: &dyn ErasedSolver, tet: usize, limit: Option<KappaLimit>) -> bool {
     limit.is_some_and(|limit| solver.kappa_of(tet, limit.substep_time) > limit.kappa)
-}
-
-/// A quarter of the mass of each tet around a particle, summed in the order of the tets, which `star` has afterwards.
-pub(crate) fn mass(
-    solver: &dyn ErasedSolver,
-    cuttable: &CuttableMesh,
-    particle: ParticleId,
-    star: &mut Vec<TetId>,
-) -> f64 {
-    star.clear();
-    star.extend(cuttable.around(particle));
-    star.sort_unstable();
-    let quarter = |t: &TetId| 0.25 * solver.density_of(t.index()) * cuttable.mesh().volume(*t);
-    // Rounding can make the volume of a sliver negative.
-    star.iter().map(quarter).sum::<f64>().max(0.0)
-}
-
-/// The particles whose tets changed, ascending.
-fn touched(delta: &CutDelta) -> Vec<ParticleId> {
-    let added = delta.added.iter().flat_map(|tet| tet.corners);
-    let relinked = delta
-        .relinked
-        .iter()
-        .flat_map(|tet| tet.before.into_iter().chain(tet.after));
-    let removed = delta.removed.iter().chain(&delta.deleted);
-    let removed = removed.flat_map(|tet| tet.corners);
-    let mut touched: Vec<ParticleId> = added.chain(relinked).chain(removed).collect();
-    touched.sort_unstable();
-    touched.dedup();
-    touched
-}
-
-/// Splits particles, ascending, into regions that are connected by the tets that an improvement reshaped or deleted. Each
-/// region ascends.
-fn regions(delta: &CutDelta, particles: &[ParticleId]) -> Vec<Vec<ParticleId>> {
-    let mut root: Vec<usize> = (0..particles.len()).collect();
-    let find = |root: &mut Vec<usize>, mut i: usize| {
-        while root[i] != i {
-            root[i] = root[root[i]];
-            i = root[i];
-        }
-        i
-    };
-    let removed = delta.removed.iter().chain(&delta.deleted);
-    let tets = removed.map(|tet| tet.corners);
-    for corners in tets.chain(delta.added.iter().map(|tet| tet.corners)) {
-        let indices = corners.map(|p| particles.partition_point(|q| *q < p));
-        for index in indices {
-            let [one, other] = [indices[0], index].map(|i| find(&mut root, i));
-            root[one.max(other)] = one.min(other);
-        }
-    }
-    let mut by_root: Vec<(usize, ParticleId)> = Vec::with_capacity(particles.len());
-    for (i, &particle) in particles.iter().enumerate() {
-        by_root.push((find(&mut root, i), particle));
-    }
-    by_root.sort_unstable();
-    let regions = by_root.chunk_by(|a, b| a.0 == b.0);
-    regions
-        .map(|region| region.iter().map(|&(_, p)| p).collect())
-        .collect()
-}
-
-/// Linear and angular momentum of particles, the latter about the origin.
-#[derive(Clone, Copy)]
-struct Momentum {
-    linear: DVec3,
-    angular: DVec3,
-}
-
-impl Momentum {
-    fn of(solver: &dyn ErasedSolver, particles: &[ParticleId]) -> Self {
-        let (mut linear, mut angular) = (DVec3::ZERO, DVec3::ZERO);
-        for p in particles.iter().map(|p| p.index()) {
-            let momentum = solver.mass(p) * solver.velocity(p);
-            linear += momentum;
-            angular += solver.position(p).cross(momentum);
-        }
-        Self { linear, angular }
-    }
-
-    /// Gives particles that have other masses now this momentum again, with the rigid motion that makes up for the
-    /// difference. A region where the solver holds a particle still keeps its velocities.
-    fn restore(self, solver: &mut dyn ErasedSolver, particles: &[ParticleId]) {
-        let with_mass = particles.iter().map(|p| p.index());
-        let with_mass: Vec<usize> = with_mass.filter(|&p| solver.mass(p) > 0.0).collect();
-        if with_mass.iter().any(|&p| !solver.is_free(p)) {
-            return;
-        }
-        let total: f64 = with_mass.iter().map(|&p| solver.mass(p)).sum();
-        if total <= 0.0 {
-            return;
-        }
-        let sum = with_mass
-            .iter()
-            .map(|&p| solver.mass(p) * solver.position(p));
-        let center = sum.sum::<DVec3>() / total;
-        let now = Self::of(solver, particles);
-        let missing = self.linear - now.linear;
-        let turn = self.angular - now.angular - center.cross(missing);
-        // Sum of m (r² 1 - r rᵀ).
-        let mut inertia = DMat3::ZERO;
-        for &p in &with_mass {
-            let r = solver.position(p) - center;
-            let outer = DMat3::from_cols(r * r.x, r * r.y, r * r.z);
-            inertia +=
-                (DMat3::from_diagonal(DVec3::splat(r.length_squared())) - outer) * solver.mass(p);
-        }
-        let rotation = inertia.inverse() * turn;
-        let rotation = if rotation.is_finite() {
-            rotation
-        } else {
-            DVec3::ZERO
-        };
-        for p in with_mass {
-            let r = solver.position(p) - center;
-            let change = missing / total + rotation.cross(r);
-            solver.set_velocity(p, solver.velocity(p) + change);
-        }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use incise_cutting::{
-        CutOptions, ImproveOptions, ImproveQueue, Plane, StrokeRegistry, cut_plane, improve,
-    };
-    use incise_mesh::kuhn_box;
-    use incise_xpbd::Material;
-
-    use super::*;
-
-    /// A twisted, tumbling body is cut and improved: mass, linear and angular momentum stay to 1e-12, of all of it and of
-    /// each region.
-    #[test]
-    fn improvement_keeps_mass_and_momentum() -> Result<(), Error> {
-        for snap in [0.0, 0.1] {
-            let mesh = kuhn_box([5; 3], DVec3::ONE);
-            let mut cuttable = CuttableMesh::new(mesh.clone()).unwrap();
-            let mut any = AnySolver::of_particles(Precision::F64, &mesh.positions);
-            let mut star = Vec::new();
-            let solver = any.edit()?;
-            let material = Material {
-                young_modulus: 1e5,
-                poisson_ratio: 0.4,
-                density: 1100.0,
-                damping: 0.0,
-            };
-            solver.add_material(material).unwrap();
-            for (t, tet) in mesh.tets.iter().enumerate() {
-                solver.push_tet(tet.map(|p| p.0), mesh.corners(TetId::new(t)), 0);
-            }
-            for (p, x) in mesh.positions.iter().enumerate() {
-                let (sin, cos) = (0.4 * x.z).sin_cos();
-                let twisted = DVec3::new(cos * x.x - sin * x.y, sin * x.x + cos * x.y, x.z);
-                solver.set_position(p, twisted);
-                solver.set_velocity(p, DVec3::new(x.y * x.z, 1.0 - x.x, (7.0 * x.x).sin()));
-                let mass = mass(solver, &cuttable, ParticleId::new(p), &mut star);
-                solver.set_mass(p, mass);
-            }
-            let all = |any: &AnySolver| {
-                let solver = any.host();
-                let all = (0..solver.particle_count()).map(ParticleId::new);
-                let all: Vec<ParticleId> = all.collect();
-                let mass: f64 = all.iter().map(|p| solver.mass(p.index())).sum();
-                let mut positions = Vec::new();
-                solver.positions(&mut positions);
-                (mass, Momentum::of(solver, &all), positions)
-            };
-            let mut queue = ImproveQueue::default();
-            for (i, normal) in [DVec3::X, DVec3::new(1.0, 0.3, 0.1)]
-                .into_iter()
-                .enumerate()
-            {
-                let plane = Plane {
-                    point: DVec3::splat(0.43 + 0.05 * i as f64),
-                    normal,
-                };
-                let options = CutOptions {
-                    snap,
-                    ..CutOptions::default()
-                };
-                let (_, _, positions) = all(&any);
-                let delta = cut_plane(&mut cuttable, &positions, &plane, &options).unwrap();
-                any.apply_delta(&delta, &cuttable).unwrap();
-                queue.extend(delta.created_particles());
-            }
-            let (mass, before, positions) = all(&any);
-            let options = ImproveOptions::default();
-            let registry = StrokeRegistry::default();
-            let body = &mut cuttable;
-            let delta = improve(body, &positions, &mut queue, &options, &registry, |_, _| {
-                false
-            });
-            let delta = delta.unwrap();
-            assert!(delta.collapsed > 10);
-            any.apply_delta(&delta, &cuttable).unwrap();
-            let (mass_after, after, positions_after) = all(&any);
-            assert_eq!(positions, positions_after);
-            assert!((mass_after / mass - 1.0).abs() < 1e-12);
-            let differs = |a: DVec3, b: DVec3| a.distance(b) / a.length();
-            assert!(differs(before.linear, after.linear) < 1e-12);
-            assert!(differs(before.angular, after.angular) < 1e-12);
-        }
-        Ok(())
-    }
 }

@@ -30,6 +30,7 @@ use crate::distance::Distances;
 use crate::forces::Measured;
 use crate::grab::{Grab, Grabs};
 use crate::island_builder::IslandBuilder;
+use crate::masses::Masses;
 use crate::method::{leaves_open, resolve};
 use crate::partition::Partition;
 use crate::recluster::Recluster;
@@ -74,6 +75,7 @@ pub(crate) struct Island {
     /// Mesh at rest; its particles and tets are numbered within the island.
     pub(crate) cuttable: CuttableMesh,
     pub(crate) solver: AnySolver,
+    pub(crate) masses: Masses,
     pub(crate) partition: Partition,
     /// Its colliders are where they are at the start of the next frame.
     pub(crate) settings: StepSettings,
@@ -276,7 +278,7 @@ impl Island {
         let mut cuttable = CuttableMesh::new(mesh).map_err(Error::cut("body"))?;
         // In a scene with contact improvement leaves the boundary alone.
         cuttable.record_opened_faces(scene.cutting.improve && scene.contact.is_none());
-        let mut solver = joined.solver(precision, &cuttable)?;
+        let (mut solver, masses) = joined.solver(scene, precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
         let mut at_start = starts_inside(scene, &settings, &joined, cuttable.mesh());
@@ -333,6 +335,7 @@ impl Island {
             initial_volume: cuttable.mesh().total_volume(),
             removed_volume: 0.0,
             cuttable,
+            masses,
             bodies: joined.bodies,
             body_of: joined.body_of,
             judged,
@@ -780,7 +783,8 @@ impl Island {
             let data = accuracy_data(self.solver.host(), tet.tet.index(), settings);
             self.judged.outside.remove(data);
         }
-        self.solver.apply_delta(delta, &self.cuttable)?;
+        let masses = &mut self.masses;
+        self.solver.apply_delta(delta, &self.cuttable, masses)?;
         let mut stiffest = 0.0_f64;
         for tet in &delta.added {
             let slot = delta.slot_after(tet.tet).index();
@@ -870,7 +874,7 @@ impl Island {
             )));
         }
         self.solver
-            .check(&self.cuttable, &self.partition.schedule)?;
+            .check(&self.cuttable, &self.partition.schedule, &self.masses)?;
         self.constraints.grabs.check(&self.solver)?;
         if let Some(contacts) = &self.constraints.contacts {
             contacts.check(&self.cuttable)?;

@@ -12,8 +12,9 @@ use incise_xpbd::{ErasedSolver, Material};
 
 use crate::accuracy::{DEFAULT_ACCURACY, largest_kappas};
 use crate::attachment::{Attachment, AttachmentHandle};
-use crate::backend::{AnySolver, mass};
+use crate::backend::AnySolver;
 use crate::distance::{DistanceHandle, Distances};
+use crate::masses::Masses;
 use crate::method::tet_solve;
 use crate::resolved_body::ResolvedBody;
 use crate::scene::{Precision, SolverSpec, Substeps};
@@ -146,12 +147,13 @@ impl IslandBuilder {
         Volumes::new(self.volume_compliances.clone())
     }
 
-    /// The solver of an island whose mesh is `cuttable`, without what hangs on its particles.
+    /// The solver of an island whose mesh is `cuttable`, without what hangs on its particles, and the masses of these.
     pub(crate) fn solver(
         &self,
+        scene: &Scene,
         precision: Precision,
         cuttable: &CuttableMesh,
-    ) -> Result<AnySolver, Error> {
+    ) -> Result<(AnySolver, Masses), Error> {
         let mesh = cuttable.mesh();
         let mut any = AnySolver::of_particles(precision, &mesh.positions);
         let solver = any.edit()?;
@@ -163,10 +165,8 @@ impl IslandBuilder {
             let rest = mesh.corners(TetId::new(t));
             solver.push_tet(tet.map(|p| p.0), rest, self.material_of[t]);
         }
-        let mut star = Vec::new();
+        let masses = Masses::new(cuttable, solver, scene.contact.is_some());
         for (p, &fixed) in self.fixed.iter().enumerate() {
-            let mass = mass(solver, cuttable, ParticleId::new(p), &mut star);
-            solver.set_mass(p, mass);
             if fixed {
                 solver.set_fixed(p, true);
             }
@@ -176,7 +176,7 @@ impl IslandBuilder {
                 solver.set_velocity(p, *velocity);
             }
         }
-        Ok(any)
+        Ok((any, masses))
     }
 
     /// The substeps of the island: the most that a body asks for. Where it is left open, also how they were chosen.

@@ -42,6 +42,7 @@ mod island;
 mod island_builder;
 mod islands;
 mod live_blade;
+mod masses;
 mod measure;
 mod merged_mesh;
 mod method;

@@ -397,6 +397,14 @@ impl Simulation {
         array::from_vectors(py, &velocities)
     }
 
+    /// Masses of all particles in kg, shape (n,), float64, in the order of ``positions``: a read-only copy that stays valid.
+    /// In a scene with contact heavy corners of tets at cuts lend mass to light ones, so these are not quarters of the tets.
+    #[getter]
+    fn masses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        let masses = self.with(py, |state| state.simulation.masses())?;
+        array::from_floats(py, &masses)
+    }
+
     /// The mesh at rest of all bodies with all cuts made so far. A removal of tets leaves unused points.
     #[getter]
     fn mesh(&self, py: Python<'_>) -> PyResult<Mesh> {

@@ -48,6 +48,7 @@ def test_throw_and_spin(bar):
     mass = np.zeros(len(points))
     np.add.at(mass, tets.ravel(), np.repeat(volumes(points, tets), 4) / 4)
     np.testing.assert_allclose(mass @ sim.positions / mass.sum(), center, atol=1e-9)
+    np.testing.assert_allclose(sim.masses, 1000.0 * mass, rtol=1e-12)
     assert sim.positions[-1, 1] > points[-1, 1]
 
 

@@ -50,6 +50,8 @@ impl Island {
         let mut pieces = self.pieces.clone();
         pieces.append(&other.pieces);
         let mut solver = self.solver.joined_with(&other.solver)?;
+        let mut masses = self.masses.clone();
+        masses.append(&other.masses);
         for softened in [self, other] {
             let limit = kappa_limit(&softened.spec, &softened.settings);
             solver.limit_kappa(limit, None, cuttable.mesh())?;
@@ -149,6 +151,7 @@ impl Island {
             removed_volume: self.removed_volume + other.removed_volume,
             judged,
             cuttable,
+            masses,
             sleep: scene.solver.sleep.map(SleepState::new),
             recluster: scene.solver.recluster.map(Recluster::new),
         };

@@ -6,6 +6,7 @@
 
 use glam::DVec3;
 use incise_mesh::ParticleId;
+use incise_xpbd::ErasedSolver;
 use web_time::Instant;
 
 use super::Simulation;
@@ -160,12 +161,42 @@ impl Simulation {
     /// ```
     #[must_use]
     pub fn velocities(&self) -> Vec<DVec3> {
-        let particles = 0..self.mesh().positions.len();
-        let of_particle = |p| {
-            let (island, particle) = self.location_of(ParticleId::new(p));
-            self.state.islands[island].solver.host().velocity(particle)
-        };
-        particles.map(of_particle).collect()
+        self.of_particles(|solver, particle| solver.velocity(particle))
+    }
+
+    /// Returns the masses of all particles of [`Simulation::mesh`] in kg. A tet gives a quarter of its mass to each corner.
+    /// In a scene with contact heavy corners of tets at cuts lend mass to light ones, so that what presses on a light corner
+    /// does not throw it. The sum is the mass of the bodies; particles without tets have none. O(particles).
+    ///
+    /// # Example
+    /// ```
+    /// use incise::mesh::glam::DVec3;
+    /// use incise::{Scene, Simulation};
+    ///
+    /// let scene = Scene::from_toml(
+    ///     "[[body]]\nshape = { kind = \"box\", tets = 200 }\nvelocity = [2.0, 0.0, 0.0]",
+    /// )?;
+    /// let simulation = Simulation::new(&scene)?;
+    /// let (masses, velocities) = (simulation.masses(), simulation.velocities());
+    /// let mass: f64 = masses.iter().sum();
+    /// assert!((mass / (1000.0 * simulation.mesh().total_volume()) - 1.0).abs() < 1e-9);
+    /// let momentum: DVec3 = masses.iter().zip(&velocities).map(|(m, v)| *m * *v).sum();
+    /// assert!((momentum / mass - DVec3::X * 2.0).length() < 1e-6);
+    /// # Ok::<(), incise::Error>(())
+    /// ```
+    #[must_use]
+    pub fn masses(&self) -> Vec<f64> {
+        self.of_particles(|solver, particle| solver.mass(particle))
+    }
+
+    /// A value of each particle of the mesh.
+    fn of_particles<T>(&self, value: impl Fn(&dyn ErasedSolver, usize) -> T) -> Vec<T> {
+        let particles = (0..self.mesh().positions.len()).map(ParticleId::new);
+        let located = particles.map(|p| self.location_of(p));
+        let islands = &self.state.islands;
+        located
+            .map(|(island, particle)| value(islands[island].solver.host(), particle))
+            .collect()
     }
 
     /// Returns a note on the compute device: its name, or why `auto` took the CPU; `None` if the scene requests the

@@ -117,6 +117,7 @@ impl Island {
             .as_ref()
             .map_or(0, |contacts| contacts.bytes());
         self.solver.backend().bytes()
+            + self.masses.bytes()
             + contacts
             + tets * (CUTTING + PIECES + partitions * PARTITION)
             + particles * (CUTTING_PARTICLE + POSITION)
