@@ -1005,7 +1005,7 @@ impl ContactDetector {
             let lookout = Lookout::new(&boxes[slot as usize], &triangle.steps, &reach);
             let normal = triangle.normal.extend(0.0).as_vec4();
             let (tet, piece) = (triangle.tet, triangle.owner.piece);
-            let ask = |children: &Children| Answers {
+            let ask = |children: &Children, _| Answers {
                 first: lookout.reached(children) & !turned_away(&children.normals, normal),
                 second: children.bounds.overlapping(&tet),
             };

@@ -361,7 +361,7 @@ fn look_around(
         }
         true
     };
-    let ask = |children: &Children| Answers {
+    let ask = |children: &Children, _| Answers {
         first: lookout.reached(children),
         second: 0,
     };

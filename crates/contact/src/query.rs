@@ -14,7 +14,10 @@
 //!    of the thickness there.
 //!
 //! A vertex inside a tet of a body that no such triangle explains is deep: from that tet the neighbors are searched for a
-//! way out, nearest first, up to 64 tets. If there is none, the vertex is buried.
+//! way out, nearest first, up to 64 tets. If there is none, the vertex is buried. Such a tet is one that held the vertex at
+//! the last search, one to which a way leads from a near triangle, or one behind a triangle of the surface. Of the latter in
+//! its own part, only those count whose triangles face the vertex: around each vertex lie many others, which it has not come
+//! through.
 //!
 //! A vertex of an inverted tet is on the wrong side of its own surface, where contact with its own part would hold it: so
 //! it touches nothing of that part until elasticity has brought it back and no tet of the part contains it. While the tet
@@ -246,6 +249,12 @@ pub(crate) fn turned_away(normals: &Boxes, normal: Vec4) -> u32 {
     least.cmpge(Vec4::splat(FACING_SINGLE)).bitmask()
 }
 
+/// Whether sides with such a dot product of their normals face each other. There is none beside a vertex without a normal,
+/// which all face.
+fn is_facing(facing: f64) -> bool {
+    facing < FACING || !facing.is_finite()
+}
+
 /// A dot product of unit vectors rounded to a millionth, so that triangles of one plane face a vertex alike.
 #[expect(clippy::cast_possible_truncation, reason = "within a few millions")]
 fn rounded(facing: f64) -> i64 {
@@ -278,6 +287,9 @@ struct Vertex<'q> {
     piece: u32,
     /// Whether it may touch its own part.
     touches_own: bool,
+    /// The part whose tets count as containing it only where their triangles face it: its own, unless a tet at it is or was
+    /// inverted.
+    faced_part: Option<u32>,
     normals: &'q VertexNormals,
 }
 
@@ -310,14 +322,16 @@ impl Query<'_> {
     fn vertex_of<'q>(&self, id: ParticleId, normals: &'q VertexNormals) -> Option<Vertex<'q>> {
         let (first, _) = self.shape.surface.corners(id).next()?;
         let x = self.state.positions[id.index()];
+        let inversion = self.shape.inversion(id);
+        let piece = self.state.pieces.piece_of(self.shape.triangle(first).tet);
         Some(Vertex {
             id,
             x,
             behind: x - normals.mean() * (BEHIND * self.mean_edge),
             body: self.body_of[id.index()],
-            piece: self.state.pieces.piece_of(self.shape.triangle(first).tet),
-            touches_own: self.settings.self_contact
-                && self.shape.inversion(id) != Inversion::Present,
+            piece,
+            touches_own: self.settings.self_contact && inversion != Inversion::Present,
+            faced_part: (inversion == Inversion::None).then_some(piece),
             normals,
         })
     }
@@ -357,7 +371,7 @@ impl Query<'_> {
             if !self.may_touch(vertex, leaf.number) {
                 return true;
             }
-            if beside.may_contain {
+            if beside.may_contain && self.counts_as_containing(vertex, leaf) {
                 let tet = self.shape.triangle(leaf.number).tet;
                 if self.is_inside(tet, vertex) {
                     containing = containing.min(tet.0);
@@ -387,6 +401,13 @@ impl Query<'_> {
             found.inside = tet.0;
             return;
         }
+        // What merely touches is not inside.
+        if let Some((near, _)) = nearest
+            && containing == NONE
+            && let Some(tet) = self.way(near, vertex, vertex.behind)
+        {
+            containing = tet.0;
+        }
         if let Some(tet) = was_inside.and_then(|tet| self.followed(tet, vertex)) {
             containing = tet.0;
         }
@@ -415,9 +436,8 @@ impl Query<'_> {
         };
         let lookout = self.lookout(&vertex);
         let is_near = |leaf: &Leaf| {
-            let facing = normals.facing(self.shape.normal(leaf.number));
             let most = f64::from(lookout.reach(&leaf.steps));
-            (facing < FACING || !facing.is_finite())
+            self.faces(&vertex, leaf.number)
                 && self.within_reach(&vertex, leaf.number, most).is_some()
         };
         let meets_none = self.each_beside(&vertex, &lookout, |leaf, beside| {
@@ -425,10 +445,22 @@ impl Query<'_> {
             let is_met = is_of_parts(leaf.part)
                 && self.may_touch(&vertex, leaf.number)
                 && (beside.is_near && is_near(leaf)
-                    || beside.may_contain && self.is_inside(tet(), &vertex));
+                    || beside.may_contain
+                        && self.counts_as_containing(&vertex, leaf)
+                        && self.is_inside(tet(), &vertex));
             !is_met
         });
         !meets_none
+    }
+
+    /// Whether a triangle faces a vertex.
+    fn faces(&self, vertex: &Vertex<'_>, slot: u32) -> bool {
+        is_facing(vertex.normals.facing(self.shape.normal(slot)))
+    }
+
+    /// Whether the vertex is deep if the tet behind a triangle contains it.
+    fn counts_as_containing(&self, vertex: &Vertex<'_>, leaf: &Leaf) -> bool {
+        vertex.faced_part != Some(leaf.part) || self.faces(vertex, leaf.number)
     }
 
     /// Calls `visit` with each triangle that may face a vertex within its reach, or has a tet behind it that may contain it,
@@ -440,18 +472,28 @@ impl Query<'_> {
         lookout: &Lookout,
         mut visit: impl FnMut(&Leaf, Beside) -> bool,
     ) -> bool {
-        let normals = vertex.normals;
         let behind = Box32::around(&Bounds::around([vertex.behind]));
         // What is unsound has an empty box.
-        let ask = |children: &Children| {
+        let ask = |children: &Children, part: u32| {
             let reached = lookout.reached(children);
-            let away = match reached {
+            let containing = children.tets.overlapping(&behind);
+            let is_faced = vertex.faced_part == Some(part);
+            let asked = if is_faced {
+                reached | containing
+            } else {
+                reached
+            };
+            let away = match asked {
                 0 => 0,
-                _ => normals.turned_away(&children.normals),
+                _ => vertex.normals.turned_away(&children.normals),
             };
             Answers {
                 first: reached & !away,
-                second: children.tets.overlapping(&behind),
+                second: if is_faced {
+                    containing & !away
+                } else {
+                    containing
+                },
             }
         };
         let mut look = |leaf: &Leaf, [is_near, may_contain]: [bool; 2]| {
@@ -552,7 +594,7 @@ impl Query<'_> {
     /// The triangle of a slot if the vertex may be about to touch it or has passed it; `most` bounds its distance.
     fn near(&self, vertex: &Vertex<'_>, slot: u32, most: f64) -> Option<Near> {
         let facing = vertex.normals.facing(self.shape.normal(slot));
-        if facing >= FACING && facing.is_finite() {
+        if !is_facing(facing) {
             return None;
         }
         let x = vertex.x;
@@ -561,6 +603,11 @@ impl Query<'_> {
         let key = self.shape.surface.key(slot);
         if part != TrianglePart::Face {
             let closer = (distance - SAME * self.mean_edge).max(0.0);
+            // Those of the vertex are closest.
+            let is_own = |(other, _)| self.shape.triangle(other).particles.contains(&vertex.id);
+            if closer > 0.0 && self.shape.around(slot, part).any(is_own) {
+                return None;
+            }
             let rank = (rounded(facing), key);
             let around = self.shape.around(slot, part);
             for (other, _) in around.filter(|(other, _)| *other != slot) {
@@ -792,7 +839,6 @@ impl Query<'_> {
             is_inside: true,
             apart: None,
         };
-        let facing = vertex.normals.facing(self.shape.normal(slot));
-        (near, facing < FACING || !facing.is_finite())
+        (near, self.faces(vertex, slot))
     }
 }

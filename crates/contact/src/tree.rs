@@ -15,7 +15,7 @@ use std::ops::Range;
 use glam::{BVec4A, DVec3, Vec4};
 use incise_mesh::Bounds;
 
-use crate::index::index;
+use crate::index::{NONE, index};
 
 /// The most children of a node.
 const CHILDREN: usize = 4;
@@ -116,11 +116,11 @@ fn around(numbers: &[u32], boxes: &[Box32]) -> Box32 {
 fn rounded_down(x: f64) -> f32 {
     #[expect(clippy::cast_possible_truncation, reason = "rounds to the nearest")]
     let near = x as f32;
-    if f64::from(near) > x {
-        near.next_down()
-    } else {
-        near
-    }
+    // The next number below, without a branch: rounding keeps the sign, zero's included.
+    let bits = near.to_bits();
+    let is_above = u32::from(f64::from(near) > x);
+    let is_negative = bits >> 31;
+    f32::from_bits(bits - is_above + 2 * (is_above & is_negative))
 }
 
 /// The smallest number of single precision not below `x`.
@@ -243,6 +243,9 @@ struct Node {
     below: [u32; CHILDREN],
     count: u32,
     holds_triangles: bool,
+    /// The part of all triangles below it, [`NONE`] where they are of several, as of the last refit.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    part: u32,
 }
 
 /// A triangle in a tree.
@@ -304,6 +307,7 @@ impl TriangleTree {
             below: [0; CHILDREN],
             count: 0,
             holds_triangles: false,
+            part: NONE,
         });
         self.nodes.len() - 1
     }
@@ -395,22 +399,30 @@ impl TriangleTree {
                 normals,
                 steps,
             } = &mut node.children;
+            let mut part = None;
             for (child, &place) in node.below[..node.count as usize].iter().enumerate() {
-                if node.holds_triangles {
+                let part_of_child = if node.holds_triangles {
                     let number = self.order[place as usize];
                     let item = item_of(number);
                     bounds.set(child, &boxes[number as usize]);
                     tets.set(child, &item.tet);
                     normals.set(child, &Box32::at(item.normal.extend(0.0).as_vec4()));
                     steps.set(child, &item.steps);
+                    item.part
                 } else {
-                    let child_node = &below[place as usize - i - 1].children;
-                    bounds.set(child, &child_node.bounds.all());
-                    tets.set(child, &child_node.tets.all());
-                    normals.set(child, &child_node.normals.all());
-                    steps.set(child, &child_node.steps.all());
-                }
+                    let Node { children, part, .. } = &below[place as usize - i - 1];
+                    bounds.set(child, &children.bounds.all());
+                    tets.set(child, &children.tets.all());
+                    normals.set(child, &children.normals.all());
+                    steps.set(child, &children.steps.all());
+                    *part
+                };
+                part = match part {
+                    Some(part) if part != part_of_child => Some(NONE),
+                    _ => Some(part_of_child),
+                };
             }
+            node.part = part.unwrap_or(NONE);
         }
     }
 
@@ -429,7 +441,7 @@ impl TriangleTree {
     /// Calls `visit` with each triangle whose box overlaps `wanted`.
     #[inline]
     pub(crate) fn search(&self, wanted: &Box32, mut visit: impl FnMut(&Leaf)) {
-        let ask = |children: &Children| Answers {
+        let ask = |children: &Children, _| Answers {
             first: children.bounds.overlapping(wanted),
             second: 0,
         };
@@ -440,11 +452,12 @@ impl TriangleTree {
     }
 
     /// Calls `visit` with each triangle that answers yes to one of the questions that `ask` asks, as all those above it do,
-    /// and with its two answers, until it returns false. Whether it never did.
+    /// and with its two answers, until it returns false. Whether it never did. `ask` is told the part of the triangles below
+    /// the children, [`NONE`] if they are of several.
     #[inline]
     pub(crate) fn search_where(
         &self,
-        ask: impl Fn(&Children) -> Answers,
+        ask: impl Fn(&Children, u32) -> Answers,
         mut visit: impl FnMut(&Leaf, [bool; 2]) -> bool,
     ) -> bool {
         if self.nodes.is_empty() {
@@ -455,7 +468,7 @@ impl TriangleTree {
         while count > 0 {
             count -= 1;
             let node = &self.nodes[waiting[count] as usize];
-            let Answers { first, second } = ask(&node.children);
+            let Answers { first, second } = ask(&node.children, node.part);
             let mut left = (first | second) & ((1 << node.count) - 1);
             while left != 0 {
                 let child = left.trailing_zeros() as usize;
@@ -577,7 +590,7 @@ mod tests {
         for wanted in boxes(50, 99, 8.0) {
             let search = |limit: f32| {
                 let (mut found, asked) = (Vec::new(), Cell::new(0));
-                let ask = |children: &Children| {
+                let ask = |children: &Children, _| {
                     asked.set(asked.get() + 1);
                     let faces = children.normals.low(0).cmplt(Vec4::splat(limit));
                     Answers {
@@ -615,5 +628,9 @@ mod tests {
             (f32::MAX, f32::INFINITY)
         );
         assert_eq!(rounded_down(-0.5), -0.5);
+        // What is too small for single precision.
+        let least = f32::from_bits(1);
+        assert_eq!((rounded_down(-1e-300), rounded_up(-1e-300)), (-least, 0.0));
+        assert_eq!((rounded_down(1e-300), rounded_up(1e-300)), (0.0, least));
     }
 }

@@ -21,7 +21,7 @@ fn rolled(scene: &mut Scene, length: f64, gap: f64) {
     for (x, rest) in scene.positions.iter_mut().zip(&scene.body.mesh().positions) {
         let angle = rest.x / radius;
         let r = radius + rest.z;
-        *x = DVec3::new(r * angle.cos(), rest.y, r * angle.sin());
+        *x = DVec3::new(r * angle.cos(), rest.y, -r * angle.sin());
     }
 }
 
@@ -401,6 +401,74 @@ fn a_thin_plate_is_left_by_the_nearest_way() {
     let inside: Vec<_> = inside.map(|c| c.normal_at(&scene.positions)).collect();
     assert_eq!(inside.len(), 1, "{contacts:?}");
     assert!(inside[0].z > 0.999, "{inside:?}");
+}
+
+/// A vertex that jumps into an inner tet, past the middle of a plate, is as deep as one in an outer tet.
+#[test]
+fn a_jump_past_the_middle_of_a_plate() {
+    let plate = kuhn_box([6, 6, 3], DVec3::new(0.6, 0.6, 0.06));
+    let mut spike = kuhn_box([1; 3], DVec3::splat(0.3));
+    let turn = DQuat::from_rotation_arc(DVec3::ONE.normalize(), DVec3::Z);
+    for x in &mut spike.positions {
+        *x = turn * *x + DVec3::new(0.31, 0.33, 0.2);
+    }
+    let mut scene = Scene::new(&[plate, spike], ContactSettings::default());
+    scene.update();
+    assert!(scene.contacts.faces().is_empty());
+    let tip = scene.positions.len() - 8;
+    for depth in [0.035, 0.033, 0.027] {
+        scene.shift(1, DVec3::Z * (0.06 - depth - scene.positions[tip].z));
+        scene.search();
+        compare(&scene);
+        let of_tip = |contact: &&FaceContact| contact.particles[0] as usize == tip;
+        let contacts: Vec<_> = scene.contacts.faces().iter().filter(of_tip).collect();
+        assert_eq!(contacts.len(), 1, "at depth {depth}");
+        assert!(contacts[0].normal_at(&scene.positions).z > 0.999);
+        assert!((contacts[0].gap(&scene.positions) + depth).abs() < 1e-9);
+        scene.shift(1, DVec3::Z);
+        scene.search();
+    }
+}
+
+/// The ends of a rolled plate that overlap by up to three fifths of its thickness push each other back to where they came
+/// from.
+#[test]
+fn a_roll_whose_ends_overlap() {
+    for offset in [0.009, 0.012, 0.015] {
+        let plate = kuhn_box([24, 4, 1], DVec3::new(1.2, 0.4, 0.02));
+        let mut scene = Scene::new(&[plate], ContactSettings::default());
+        rolled(&mut scene, 1.2, 0.3);
+        scene.update();
+        rolled(&mut scene, 1.2, -0.3);
+        // The end lies further out, and a little beside the start.
+        let rest = scene.body.mesh().positions.clone();
+        let out = |x: DVec3| DVec3::new(x.x, 0.0, x.z).normalize();
+        for (x, rest) in scene.positions.iter_mut().zip(&rest) {
+            *x += out(*x) * (offset * rest.x / 1.2) + DVec3::Y * (0.033 * rest.x);
+        }
+        scene.search();
+        compare(&scene);
+        // Away from the sides, by whether it is of the end.
+        let mut held = [0; 2];
+        for contact in scene.contacts.faces() {
+            let vertex = contact.particles[0] as usize;
+            let (x, at_rest) = (scene.positions[vertex], rest[vertex]);
+            let normal = contact.normal_at(&scene.positions).dot(out(x));
+            let is_at_side = at_rest.y < 0.05 || at_rest.y > 0.35;
+            if is_at_side || normal.abs() < 0.7 {
+                continue;
+            }
+            let is_end = at_rest.x > 0.6;
+            let is_inner = at_rest.z < 0.01;
+            if is_inner == is_end {
+                held[usize::from(is_end)] += 1;
+                let away = if is_end { normal } else { -normal };
+                assert!(away > 0.9, "offset {offset}: {contact:?}");
+                assert!(contact.gap(&scene.positions) < offset - 0.02 + 0.005);
+            }
+        }
+        assert_eq!(held, [18, 18], "offset {offset}");
+    }
 }
 
 /// A way out through three thin layers of tets is found, although hundreds of tets are fewer steps away.
