@@ -104,10 +104,12 @@ struct Tally {
     most_gained: f64,
     /// The largest growth without the energy of slivers.
     most_gained_without_slivers: f64,
-    /// Frames with more growth than is allowed, those in which inverted tets gain most of it, and the first frame.
+    /// Frames with more growth than is allowed, those in which inverted tets gain most of it, and the frame with the most.
     gaining: u64,
     gaining_by_inverted: u64,
-    first_gain: Option<String>,
+    worst_gain: Option<String>,
+    /// The seed with which the present body is the first.
+    body_seed: u64,
     /// Frames that also gain too much with each of [`AGAIN`].
     gaining_again: [u64; AGAIN.len()],
     /// The most contacts that pressed in a frame.
@@ -214,7 +216,7 @@ pub(crate) fn stress(arguments: &StressArguments) -> anyhow::Result<()> {
             ]);
             row.extend(tally.gaining_again.map(|frames| frames.to_string()));
         }
-        gains.extend(tally.first_gain);
+        gains.extend(tally.worst_gain);
         table.add_row(row);
     }
     println!("{table}");
@@ -237,6 +239,7 @@ fn stress_one(
     let mut told = Instant::now();
     while tally.strokes < arguments.strokes && !late() {
         tally.bodies += 1;
+        tally.body_seed = random.0;
         let mut scene = scene(model, arguments.plain, &mut random);
         scene.solver.iterations = arguments.iterations;
         if arguments.contact {
@@ -421,6 +424,7 @@ impl Energy {
         let gained = (now.all - last.all) / self.scale;
         let without_slivers = (now.without_slivers - last.without_slivers) / self.scale;
         tally.most_gained = tally.most_gained.max(gained);
+        let is_worst = gained >= tally.most_gained;
         let most = &mut tally.most_gained_without_slivers;
         *most = most.max(without_slivers);
         if gained <= MOST_GAINED {
@@ -445,16 +449,17 @@ impl Energy {
             again.push(format!("{gained:.1e}"));
             tally.gaining_again[i] += u64::from(gained > MOST_GAINED);
         }
-        tally.first_gain.get_or_insert_with(|| {
-            format!(
-                "stroke {}, frame {}: from {last:?} to {now:?} J, {gained:.1e} of weight times size; computed again with \
-                 {AGAIN:?} times the iterations, the last time without recovery: {}; {:?}",
+        if is_worst {
+            tally.worst_gain = Some(format!(
+                "stroke {}, frame {} of the body that is the first with seed {}: from {last:?} to {now:?} J, {gained:.1e} of \
+                 weight times size; computed again with {AGAIN:?} times the iterations, the last time without recovery: {}; {:?}",
                 tally.strokes,
                 report.frame,
+                tally.body_seed,
                 again.join(", "),
                 report.contact,
-            )
-        });
+            ));
+        }
         Ok(())
     }
 }
