@@ -11,6 +11,7 @@
 //! With `--contact` parts and sides of cuts touch. Energy is measured then: kinetic, elastic and gravity together must not
 //! grow in a frame by more than a part in a thousand of the energy that the body has when it falls by its own size. Frames
 //! that take tets away or collapse edges change the body and are left out. A frame that gains more fails the run at its end.
+//! The one that gains most is named, with the seed with which its body is the first.
 //! With `--energy` energy is measured without contact, to compare.
 //!
 //! One iteration a substep does not solve its equations. To tell whether the gain comes from that, a frame that gains energy
