@@ -40,6 +40,7 @@ pub struct CutOptions {
     pub min_volume_ratio: f64,
     /// Size of a crumb, from 0 (off) to 100: a part that would come off and has less than this times the mean volume of
     /// the original tets stays with the other side of the cut ([`crate::CutDelta::crumbs`] counts them).
+    /// Only with [`Separation::CutFaces`].
     pub crumbs: f64,
     /// Criterion by which the body separates.
     pub separation: Separation,

@@ -12,11 +12,23 @@ const X_HALF: Plane = Plane {
     normal: DVec3::X,
 };
 
+/// Without the rule for crumbs, which only cut faces have.
 fn cut(mesh: &TetMesh, plane: &Plane, snap: f64, separation: Separation) -> CuttableMesh {
+    cut_with_crumbs(mesh, plane, snap, separation, 0.0)
+}
+
+fn cut_with_crumbs(
+    mesh: &TetMesh,
+    plane: &Plane,
+    snap: f64,
+    separation: Separation,
+    crumbs: f64,
+) -> CuttableMesh {
     let mut body = CuttableMesh::new(mesh.clone()).unwrap();
     let options = CutOptions {
         snap,
         separation,
+        crumbs,
         ..CutOptions::default()
     };
     cut_plane(&mut body, &mesh.positions, plane, &options).unwrap();
@@ -28,6 +40,15 @@ fn pieces(mesh: &TetMesh, plane: &Plane, snap: f64, separation: Separation) -> u
     cut(mesh, plane, snap, separation).mesh().pieces().count
 }
 
+/// A body and a plane near its center.
+fn body_and_plane(kind: usize, seed: u64) -> (TetMesh, Plane) {
+    let mesh = body(kind, seed);
+    let normal = DVec3::from_array([0, 1, 2].map(|k| noise(seed, k)));
+    let center = mesh.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
+    let point = center + normal * 0.01;
+    (mesh, Plane { point, normal })
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(60))]
 
@@ -37,11 +58,8 @@ proptest! {
     fn the_criteria_agree_where_they_should(
         kind in 0_usize..6, seed in any::<u64>(), snap in prop::sample::select(vec![0.0, 0.1]),
     ) {
-        let mesh = body(kind, seed);
-        let normal = DVec3::from_array([0, 1, 2].map(|k| noise(seed, k)));
-        prop_assume!(normal.length() > 0.1);
-        let center = mesh.positions.iter().sum::<DVec3>() / mesh.positions.len() as f64;
-        let plane = Plane { point: center + normal * 0.01, normal };
+        let (mesh, plane) = body_and_plane(kind, seed);
+        prop_assume!(plane.normal.length() > 0.1);
         let by_faces = cut(&mesh, &plane, snap, Separation::CutFaces);
         let by_particles = cut(&mesh, &plane, snap, Separation::SharedOffSurface);
         prop_assert_eq!(by_faces.mesh(), by_particles.mesh());
@@ -50,6 +68,18 @@ proptest! {
             prop_assert_eq!(by_faces.mesh(), literal.mesh());
         }
     }
+}
+
+/// Four tets with a fifth of the mean volume come off a torus by both criteria; by default they stay where faces are cut.
+#[test]
+fn a_crumb_stays_where_faces_are_cut() {
+    let (mesh, plane) = body_and_plane(5, 15_881_079_787_010_595_576);
+    let [faces, particles] = [Separation::CutFaces, Separation::SharedOffSurface]
+        .map(|separation| cut(&mesh, &plane, 0.1, separation));
+    assert_eq!(faces.mesh(), particles.mesh());
+    assert_eq!(faces.mesh().pieces().count, 3);
+    let kept = cut_with_crumbs(&mesh, &plane, 0.1, Separation::CutFaces, 0.5);
+    assert_eq!(kept.mesh().pieces().count, 2);
 }
 
 /// A plane through a layer of particles: they were there before, so the literal criterion keeps both sides tied.
