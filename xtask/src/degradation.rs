@@ -162,6 +162,8 @@ pub(crate) fn degradation(arguments: &DegradationArguments) -> anyhow::Result<()
 fn scene_at_rest(model: &Model, arguments: &DegradationArguments, snap: f64) -> Scene {
     let mut scene = Scene::built_in();
     scene.contact = None;
+    // Only where it is measured.
+    scene.cutting.improve = false;
     scene.world = incise::scene::WorldSpec::default();
     model.put_into(&mut scene.body[0]);
     scene.solver.substeps = 1.into();

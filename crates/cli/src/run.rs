@@ -70,7 +70,7 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
 
     let kappa = simulation.kappa();
     let mut summary = Summary::new(simulation.report());
-    let mut checked = 0;
+    let mut checked = 0_usize;
     let progress = progress(frames, arguments.quiet);
     let mut warned = HashSet::new();
     let mut failed = None;
@@ -97,9 +97,9 @@ fn simulate(arguments: &RunArguments) -> Result<(), Failure> {
                 report.frame
             ));
         }
-        if arguments.check && report.cut.is_some() {
+        if let Some(cut) = report.cut.filter(|_| arguments.check) {
             simulation.check()?;
-            checked += 1;
+            checked += usize::from(cut.has_cut());
         }
         output.frame(&mut simulation).map_err(Failure::Run)?;
         progress.inc(1);

@@ -45,7 +45,9 @@ impl Summary {
     pub(crate) fn add(&mut self, report: &FrameReport) {
         self.times.push(report.ms);
         if let Some(cut) = &report.cut {
-            self.cutting.push(report.ms);
+            if cut.has_cut() {
+                self.cutting.push(report.ms);
+            }
             self.worst_volume_ratio = self.worst_volume_ratio.min(cut.worst_volume_ratio);
         }
         self.repaired += report.repaired;

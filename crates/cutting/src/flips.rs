@@ -70,12 +70,6 @@ impl Flip {
         cuttable.around(new[0]).any(has_all)
     }
 
-    /// Whether one of the tets has a face on the boundary.
-    pub(crate) fn is_on_boundary(&self, cuttable: &CuttableMesh) -> bool {
-        let mut faces = self.removed.iter().flat_map(|tet| Face::of(*tet));
-        faces.any(|face| matches!(cuttable.faces.behind(face), Behind::Nothing(_)))
-    }
-
     /// Puts the new tets in place of those around the edge, into their first slots. Returns the slot that is left.
     pub(crate) fn apply(&self, cuttable: &mut CuttableMesh) -> Option<TetId> {
         let CuttableMesh {

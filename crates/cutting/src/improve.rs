@@ -64,19 +64,16 @@ pub struct ImproveOptions {
     /// Largest distance of a cut face from the faces that its stroke opened, as a fraction of the edge of a regular tet with
     /// the mean volume of the original ones; from 0 to 0.25.
     pub tolerance: f64,
-    /// Whether all boundary triangles keep their particles, so that only particles inside are taken out.
-    pub keeps_boundary: bool,
     /// Number of tets to look at after which a call ends; one counts each time its shape is computed, and a cut face each
     /// time it is compared. A call looks at one particle at least.
     pub max_tets: usize,
 }
 
 impl Default for ImproveOptions {
-    /// Tolerance 0.05, boundary triangles may change, no limit of the work.
+    /// Tolerance 0.05, no limit of the work.
     fn default() -> Self {
         Self {
             tolerance: 0.05,
-            keeps_boundary: false,
             max_tets: usize::MAX,
         }
     }
@@ -180,7 +177,6 @@ pub fn improve(
     let mut improvement = Improvement {
         exact: EXACT * edge,
         tolerance: options.tolerance * edge,
-        keeps_boundary: options.keeps_boundary,
         cuttable,
         positions,
         registry,
@@ -315,7 +311,6 @@ struct Improvement<'a> {
     registry: &'a StrokeRegistry,
     exact: f64,
     tolerance: f64,
-    keeps_boundary: bool,
     first: BTreeMap<TetId, Original>,
     deleted: BTreeSet<TetId>,
     /// Tets looked at, each time counted.
@@ -437,10 +432,7 @@ impl Improvement<'_> {
         let star = Star::of(self.cuttable, particle);
         self.looked_at.set(self.looked_at.get() + star.tets.len());
         // A change of this round may have locked it.
-        if is_locked(self.cuttable, particle)
-            || !self.is_movable(&star)
-            || (self.keeps_boundary && !star.fan.is_empty())
-        {
+        if is_locked(self.cuttable, particle) || !self.is_movable(&star) {
             return Vec::new();
         }
         // Most particles that must stay are at rims and corners, which is known before their other sides are.
@@ -756,14 +748,6 @@ impl Improvement<'_> {
         let from = star.particle;
         let is_around = |tet: &&TetId| mesh.tets[tet.index()].contains(&to);
         let ring: Vec<TetId> = star.tets.iter().filter(is_around).copied().collect();
-        let is_bounded = |tet: &TetId| {
-            let faces = Face::of(*tet).into_iter();
-            let mut behind = faces.map(|face| self.cuttable.faces.behind(face));
-            behind.any(|behind| matches!(behind, Behind::Nothing(_)))
-        };
-        if self.keeps_boundary && ring.iter().any(is_bounded) {
-            return false;
-        }
         // Particles.
         let across = |tet: &TetId| {
             let corners = mesh.tets[tet.index()].into_iter();
@@ -899,7 +883,7 @@ impl Improvement<'_> {
         Some(after)
     }
 
-    /// Whether a flip leaves what must stay: the boundary if it is kept, and the surfaces of earlier strokes where later ones
+    /// Whether a flip leaves what must stay: the surfaces of earlier strokes where later ones
     /// may continue. No face of a surface goes, and a new edge beside a surface ends on it, so that none crosses it where no
     /// blade comes by any more. One end of the edge must not be locked.
     fn may_flip(
@@ -908,10 +892,7 @@ impl Improvement<'_> {
         is_locked: &impl Fn(&CuttableMesh, ParticleId) -> bool,
     ) -> bool {
         let cuttable = &*self.cuttable;
-        if flip.is_doubled(cuttable)
-            || (self.keeps_boundary && flip.is_on_boundary(cuttable))
-            || flip.edge.iter().all(|p| is_locked(cuttable, *p))
-        {
+        if flip.is_doubled(cuttable) || flip.edge.iter().all(|p| is_locked(cuttable, *p)) {
             return false;
         }
         let corners: Vec<ParticleId> = flip.edge.iter().chain(&flip.ring).copied().collect();

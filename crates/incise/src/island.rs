@@ -276,8 +276,7 @@ impl Island {
     ) -> Result<Self, Error> {
         let mesh = std::mem::take(&mut joined.mesh);
         let mut cuttable = CuttableMesh::new(mesh).map_err(Error::cut("body"))?;
-        // In a scene with contact improvement leaves the boundary alone.
-        cuttable.record_opened_faces(scene.cutting.improve && scene.contact.is_none());
+        cuttable.record_opened_faces(scene.improves());
         let (mut solver, masses) = joined.solver(scene, precision, &cuttable)?;
         let (substeps, choice) = joined.substeps(scene, &solver, &cuttable);
         settings.substeps = substeps;
@@ -716,8 +715,8 @@ impl Island {
     }
 
     /// Improves the mesh around particles that strokes created. Particles stay that a constraint names, beside which one
-    /// is held, or where materials meet, and all of the boundary in a scene with contact. Later strokes can continue those
-    /// in `registry`. Leaves in `queue` what is for the next frame.
+    /// is held, or where materials meet. Later strokes can continue those in `registry`. Leaves in `queue` what is for the
+    /// next frame.
     pub(crate) fn improve(
         &mut self,
         queue: &mut ImproveQueue,
@@ -727,16 +726,10 @@ impl Island {
             cuttable,
             positions,
             solver,
-            constraints:
-                Constraints {
-                    distances,
-                    contacts,
-                    ..
-                },
+            constraints: Constraints { distances, .. },
             ..
         } = self;
         let options = ImproveOptions {
-            keeps_boundary: contacts.is_some(),
             max_tets: IMPROVED_TETS.max(cuttable.mesh().tets.len() / IMPROVED_PART),
             ..ImproveOptions::default()
         };

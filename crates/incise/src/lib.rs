@@ -52,6 +52,7 @@ mod pieces;
 mod pinned_cut;
 mod ray;
 mod recluster;
+mod recuts;
 mod region;
 pub mod report;
 mod resolved_body;

@@ -226,6 +226,12 @@ pub struct CutWork {
 }
 
 impl CutReport {
+    /// Returns whether strokes or removals have changed the mesh, not only its improvement after strokes.
+    #[must_use]
+    pub fn has_cut(&self) -> bool {
+        self.tets_cut + self.particles_created + self.tets_removed > 0
+    }
+
     /// Adds what a stroke changed.
     pub(crate) fn add(&mut self, delta: &CutDelta) {
         if delta.is_improvement() {

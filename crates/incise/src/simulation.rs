@@ -178,7 +178,7 @@ impl Simulation {
             Precision::F32 | Precision::Auto => 1e-5,
             Precision::F64 => 1e-9,
         };
-        let mut timeline = Timeline::new(tolerance, &scene.cutting);
+        let mut timeline = Timeline::new(tolerance, scene);
         for stroke in &scene.stroke {
             timeline.add(stroke)?;
         }

@@ -4,15 +4,16 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 use incise_cutting::{
-    BoundaryTriangle, CutDelta, CutOptions, FaceTag, ImproveQueue, StrokeRegistry, Sweep, carve,
-    cut_level_set, cut_plane, cut_surface_joining,
+    BoundaryTriangle, CutDelta, CutOptions, FaceTag, StrokeRegistry, Sweep, carve, cut_level_set,
+    cut_plane, cut_surface_joining,
 };
 
 use crate::island::Island;
 use crate::live_blade::LiveBlade;
 use crate::pinned_cut::{find, meets_pinned};
+use crate::recuts::Recuts;
 use crate::report::CutWork;
-use crate::scene::{CuttingSpec, SolidBladeSpec, StrokeSpec, pose};
+use crate::scene::{Scene, SolidBladeSpec, StrokeSpec, pose};
 use crate::solid_blade::{FrameBlade, SolidBlade};
 use crate::tool::{MissedStroke, Tool, tool};
 use crate::validate::value;
@@ -50,11 +51,10 @@ pub(crate) struct Timeline {
     tolerance: f64,
     /// Largest volume of a crumb, as in [`CutOptions::crumbs`].
     crumbs: f64,
-    /// Whether meshes are improved after strokes.
+    /// Whether meshes are improved where strokes cut what earlier ones have cut.
     improves: bool,
-    /// For each island the particles around which its mesh is to be improved: those of the tets that strokes created, until
-    /// frames without a blade have worked on them.
-    created: Vec<ImproveQueue>,
+    /// For each island what is cut again; empty before the first stroke.
+    recuts: Vec<Recuts>,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
     /// Strokes that began or ended to cut since the events were taken.
@@ -73,11 +73,11 @@ pub(crate) struct Timeline {
 }
 
 impl Timeline {
-    pub(crate) fn new(tolerance: f64, cutting: &CuttingSpec) -> Self {
+    pub(crate) fn new(tolerance: f64, scene: &Scene) -> Self {
         Self {
             tolerance,
-            crumbs: cutting.crumbs,
-            improves: cutting.improve,
+            crumbs: scene.cutting.crumbs,
+            improves: scene.improves(),
             ..Self::default()
         }
     }
@@ -276,12 +276,12 @@ impl Timeline {
 
     /// Whether a stroke begins or continues in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
-        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame) || self.has_created()
+        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame) || self.has_recuts()
     }
 
     /// Whether an island waits for its improvement.
-    fn has_created(&self) -> bool {
-        self.created.iter().any(|created| !created.is_empty())
+    fn has_recuts(&self) -> bool {
+        self.recuts.iter().any(|recuts| !recuts.queue.is_empty())
     }
 
     /// Returns an error that names a stroke whose blade moves through the bodies, since it follows each island's mesh.
@@ -298,9 +298,9 @@ impl Timeline {
 
     /// Notes that island `other` was appended to island `into`, which had so many particles.
     pub(crate) fn join(&mut self, into: usize, other: usize, particles: usize) {
-        if other < self.created.len() {
-            let of_other = self.created.remove(other);
-            self.created[into].append(&of_other, particles);
+        if other < self.recuts.len() {
+            let of_other = self.recuts.remove(other);
+            self.recuts[into].append(&of_other, particles);
         }
         if other < self.registries.len() {
             let of_other = self.registries.remove(other);
@@ -318,6 +318,9 @@ impl Timeline {
         if let Some(registry) = self.registries.get_mut(number) {
             registry.apply_delta(&island.cuttable, delta, &CutOptions::default());
         }
+        if let Some(recuts) = self.recuts.get_mut(number) {
+            recuts.apply_delta(delta, None);
+        }
     }
 
     /// Carries out the strokes that are due in `frame` on every island. Passes each delta to `apply_delta` before the
@@ -330,7 +333,7 @@ impl Timeline {
     ) -> Result<(), Error> {
         self.solids.clear();
         // A live stroke may have ended since the last frame and left its improvement.
-        if self.strokes.is_empty() && !self.has_created() {
+        if self.strokes.is_empty() && !self.has_recuts() {
             return Ok(());
         }
         self.registries
@@ -351,9 +354,8 @@ impl Timeline {
                 }
                 delta.extend_particles(&mut island.positions);
                 if self.improves {
-                    self.created
-                        .resize_with(island_count, ImproveQueue::default);
-                    self.created[g].extend(delta.created_particles());
+                    self.recuts.resize_with(island_count, Recuts::default);
+                    self.recuts[g].apply_delta(&delta, Some(stroke.options.tag));
                 }
                 for other in self.strokes.iter_mut().enumerate().filter(|(j, _)| *j != i) {
                     if let Some(sweep) = other.1.sweeps.get_mut(g) {
@@ -403,12 +405,12 @@ impl Timeline {
         if self.strokes.iter().any(|stroke| !stroke.sweeps.is_empty()) {
             return Ok(());
         }
-        for (g, created) in self.created.iter_mut().enumerate() {
-            if created.is_empty() {
+        for (g, recuts) in self.recuts.iter_mut().enumerate() {
+            if recuts.queue.is_empty() {
                 continue;
             }
             let island = &mut islands[g];
-            let delta = island.improve(created, &self.registries[g])?;
+            let delta = island.improve(&mut recuts.queue, &self.registries[g])?;
             if !delta.is_empty() {
                 apply_delta(g, island, &delta)?;
             }

@@ -25,6 +25,8 @@ pub(super) fn cut_at_rest(
     scene.solver.iterations = ITERATIONS;
     scene.solver.clustering = clustering.to_owned();
     scene.solver.merge_clusters = false;
+    // The paper has no improvement of cut meshes.
+    scene.cutting.improve = false;
     scene.stroke = strokes(mesh, scene.body[0].scale, frames, blades);
     Ok(scene)
 }

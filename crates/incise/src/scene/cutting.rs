@@ -12,10 +12,10 @@ pub struct CuttingSpec {
     /// the other side of the cut, if that is at least eight times as large as a crumb; 0 lets every part come off.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub crumbs: f64,
-    /// Whether particles that cuts created are taken out again where the mesh is better or as good without them, so that
-    /// cuts of cuts do not make ever smaller tets: in frames without a blade on its way, some in each. Cut faces stay
-    /// within a twentieth of an edge of where they were cut; in a scene with contact they do not move, and only particles
-    /// inside are taken out.
+    /// Whether particles that cuts created are taken out again where a stroke cuts what an earlier one has cut, so that
+    /// cuts of cuts do not make ever smaller tets: where the mesh is better or as good without them, in frames without a
+    /// blade on its way, some in each. Cut faces stay within a twentieth of an edge of where they were cut. A single stroke
+    /// leaves its mesh as it cut it, and so do all strokes in a scene with contact, where cut faces must not move.
     pub improve: bool,
 }
 
@@ -23,7 +23,7 @@ impl Default for CuttingSpec {
     fn default() -> Self {
         Self {
             crumbs: 0.5,
-            improve: false,
+            improve: true,
         }
     }
 }

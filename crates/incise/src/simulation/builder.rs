@@ -13,8 +13,8 @@ use crate::compute_device::ComputeDevice;
 use crate::device::OpenDevice;
 use crate::distance::DistanceHandle;
 use crate::scene::{
-    AttachmentSpec, Backend, BodySpec, ColliderSpec, ContactSpec, DistanceSpec, GroundSpec,
-    MaterialSpec, Region, ReportSpec, SolverSpec, StrokeSpec,
+    AttachmentSpec, Backend, BodySpec, ColliderSpec, ContactSpec, CuttingSpec, DistanceSpec,
+    GroundSpec, MaterialSpec, Region, ReportSpec, SolverSpec, StrokeSpec,
 };
 use crate::validate::value;
 use crate::{Error, Scene, Simulation};
@@ -210,6 +210,12 @@ impl SimulationBuilder {
     /// Enables contact between bodies, between their pieces, between the sides of cuts, and of a body with itself.
     pub fn contact(&mut self, contact: ContactSpec) -> &mut Self {
         self.scene.contact = Some(contact);
+        self
+    }
+
+    /// Sets what all cuts have in common: crumbs, and improvement of the mesh where strokes cut what others have cut.
+    pub fn cutting(&mut self, cutting: CuttingSpec) -> &mut Self {
+        self.scene.cutting = cutting;
         self
     }
 

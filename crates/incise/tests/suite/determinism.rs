@@ -78,18 +78,21 @@ fn results_are_those_of_the_last_version() {
         "[world]\ngravity = [0.0, 0.0, -9.81]\nground = {{ height = -0.6, friction = 0.5 }}\n\
          {body}damping = 0.001\n{strokes}"
     ));
-    for (precision, golden) in [
-        (Precision::F32, 0xf588_7e86_2bcf_cd37),
-        (Precision::F64, 0xdbd5_7f7c_6c8d_9852),
+    for (precision, improve, golden) in [
+        (Precision::F32, false, 0xf588_7e86_2bcf_cd37),
+        (Precision::F64, false, 0xdbd5_7f7c_6c8d_9852),
+        (Precision::F32, true, 0xa9c7_1d64_daa4_4325),
+        (Precision::F64, true, 0x197a_e0c7_774e_2362),
     ] {
         scene.solver.precision = precision;
+        scene.cutting.improve = improve;
         for threads in 1..=3 {
             let mut simulation = Simulation::with_threads(&scene, threads).unwrap();
             for _ in 0..10 {
                 simulation.step().unwrap();
             }
             let hash = hash(state(&simulation));
-            assert!(hash == golden, "{precision:?} gives {hash:#018x}");
+            assert!(hash == golden, "{precision:?}, {improve}: {hash:#018x}");
         }
     }
 }

@@ -5,7 +5,7 @@ use incise::meshing::{Shape, generate};
 use incise::scene::{
     AttachmentSpec, DistanceSpec, EndSpec, Precision, Region, SolverSpec, StrokeSpec, Substeps,
 };
-use incise::{Body, Scene, Simulation, SimulationBuilder};
+use incise::{Body, Simulation};
 
 /// Three boxes in a row without gravity, each in an island of its own.
 fn row(precision: Precision) -> Simulation {
@@ -233,9 +233,7 @@ fn bodies_are_not_joined_under_a_moving_blade() {
 /// Improvements after the join take out particles of cuts only, whichever body they are of.
 #[test]
 fn a_join_keeps_what_waits_to_be_improved_and_original_particles() {
-    let mut scene = Scene::default();
-    scene.cutting.improve = true;
-    let mut builder = SimulationBuilder::from_scene(scene);
+    let mut builder = Simulation::builder();
     builder.solver(SolverSpec::default().with(|spec| spec.substeps = Substeps::Fixed(10)));
     for x in [-2.0, 0.0, 2.0] {
         let mesh = generate(Shape::Box, 200).unwrap();
@@ -243,6 +241,9 @@ fn a_join_keeps_what_waits_to_be_improved_and_original_particles() {
     }
     let mut simulation = builder.build().unwrap();
     let originals = simulation.mesh().positions.len();
+    simulation
+        .cut(StrokeSpec::plane(0, [0.05, 0.02, 0.0], [1.0, 0.1, 0.1]).with_snap(0.0))
+        .unwrap();
     let blade = |z: f64| [dvec3(0.07, -1.0, z), dvec3(0.07, 1.0, z)];
     let stroke = simulation.begin_stroke(&blade(0.8), 0.0).unwrap();
     simulation.step().unwrap();

@@ -4,7 +4,8 @@
 use glam::{DQuat, DVec3, dvec3};
 use incise::mesh::kuhn_box;
 use incise::scene::{
-    AttachmentSpec, DistanceSpec, EndSpec, Method, Precision, Region, SolverSpec, StrokeSpec,
+    AttachmentSpec, CuttingSpec, DistanceSpec, EndSpec, Method, Precision, Region, SolverSpec,
+    StrokeSpec,
 };
 use incise::{Body, DistanceHandle, Grab, Simulation, SimulationBuilder, Snapshot};
 use proptest::prelude::*;
@@ -267,8 +268,10 @@ fn body_of(act: &Act, bodies: usize) -> usize {
 /// A builder with settings of a method.
 fn builder(method: Method, precision: Precision, substeps: u32) -> SimulationBuilder {
     let mut builder = Simulation::builder();
+    // The work of improvement in a frame is limited by island, so meshes of joined bodies differ for some frames.
     builder
         .threads(1)
+        .cutting(CuttingSpec::default().with(|spec| spec.improve = false))
         .solver(SolverSpec::of(method).with(|spec| {
             spec.substeps = substeps.into();
             spec.precision = precision;

@@ -25,12 +25,23 @@ impl Random {
 /// A free body of 25 cm without gravity, and random strokes of a blade through it, one in each frame.
 fn scene(shape: &str, strokes: usize, snap: f64, precision: Precision, seed: u64) -> Scene {
     let text = format!(
-        "[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\ntime_step = 0.01\nprecision = \"{}\"\n\
+        "{}[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\ntime_step = 0.01\nprecision = \"{}\"\n\
          [[body]]\nshape = {{ kind = \"{shape}\", tets = 1500 }}\nscale = 0.25\nyoung_modulus = 1e5\n{}",
+        improvement(snap),
         precision.name(),
         random_sweeps(strokes, snap, seed)
     );
     Scene::from_toml(&text).unwrap()
+}
+
+/// Improvement as by default, but off with a snap of 0, where in single precision corners of slivers move by 1 to 2 cm/s
+/// after some frames with or without it.
+fn improvement(snap: f64) -> &'static str {
+    if snap == 0.0 {
+        "[cutting]\nimprove = false\n"
+    } else {
+        ""
+    }
 }
 
 /// Measured after 10 strokes: at most 2e-11 m/s in double and 2e-4 m/s in single precision, with snapping of 0, 0.1
@@ -86,8 +97,9 @@ fn an_irregular_body_stays_at_rest_at_every_snap_distance() {
     for snap in [0.0, 0.1, 0.2] {
         for (precision, bound) in [(Precision::F64, 1e-9), (Precision::F32, 1e-2)] {
             let text = format!(
-                "[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\nprecision = \"{}\"\n\
+                "{}[report]\nquantities = [\"speed\", \"volume\"]\n[solver]\nprecision = \"{}\"\n\
                  [[body]]\nmesh = {file:?}\nscale = 0.25\nyoung_modulus = 1e5\n{}",
+                improvement(snap),
                 precision.name(),
                 random_sweeps(strokes, snap, 7)
             );
