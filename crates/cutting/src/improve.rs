@@ -883,9 +883,9 @@ impl Improvement<'_> {
         Some(after)
     }
 
-    /// Whether a flip leaves what must stay: the surfaces of earlier strokes where later ones
-    /// may continue. No face of a surface goes, and a new edge beside a surface ends on it, so that none crosses it where no
-    /// blade comes by any more. One end of the edge must not be locked.
+    /// Whether a flip leaves what must stay: the surfaces of earlier strokes where later ones may continue. No face of a
+    /// surface goes, and a new edge beside a surface ends on it, so that none crosses it where no blade comes by any more. One
+    /// end of the edge must not be locked.
     fn may_flip(
         &self,
         flip: &Flip,

@@ -1,21 +1,21 @@
 //! [`Recuts`]: where strokes cut tets that earlier strokes have made.
 //!
-//! There cuts make ever smaller tets, and there only a mesh is improved: what a single stroke leaves stays as it is. A tet
-//! that a stroke has cut has a corner that this stroke has made, so for each particle the stroke is kept that made it. A
-//! stroke across its own path does not count, since a blade cuts tets on its way in several frames.
+//! Cuts of cuts make ever smaller tets, so meshes are improved there. What a single stroke leaves stays as it is. A stroke
+//! gives each tet that it cuts a new particle, so the number of the stroke that made a particle tells which tets it has cut.
+//! A stroke that crosses its own path does not count, because a moving blade cuts the same tet in several frames.
 //!
-//! Cost: a number for each particle from the first stroke on, and work in proportion to the tets that are cut.
+//! Cost: 8 bytes a particle from the first stroke on, and work in proportion to the tets cut.
 
 use std::collections::BTreeSet;
 
 use incise_cutting::{CutDelta, ImproveQueue, RemovedTet};
 use incise_mesh::{ParticleId, TetId};
 
-/// Where strokes have cut what others had cut, and where the mesh is to be improved therefore.
+/// The places of an island where strokes have cut what earlier ones had cut.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "save", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Recuts {
-    /// The corners of the new tets there, until frames without a blade have worked on them.
+    /// The corners of the new tets there, until the mesh around them is improved.
     pub(crate) queue: ImproveQueue,
     /// For each particle the stroke that made it, if one did; may end early.
     makers: Vec<Option<u32>>,

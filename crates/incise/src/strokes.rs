@@ -256,7 +256,11 @@ impl Timeline {
         } else {
             on_cut
         };
-        UNDER_WAY * particles * under_way.count() + REMEMBERED * remembered
+        // Which stroke made them.
+        let made = if self.recuts.is_empty() { 0 } else { particles };
+        UNDER_WAY * particles * under_way.count()
+            + REMEMBERED * remembered
+            + size_of::<Option<u32>>() * made
     }
 
     /// The strokes that began or ended to cut since the last call.
