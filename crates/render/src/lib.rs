@@ -17,6 +17,7 @@ mod props;
 mod raster;
 mod render_scene;
 mod renderer;
+mod rims;
 mod shading;
 mod sheet;
 mod software;

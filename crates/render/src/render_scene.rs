@@ -2,8 +2,8 @@
 //!
 //! It holds the skin, which is updated after cuts, the colors of its triangles, obstacles and ground of the scene, and
 //! the blades. It holds no positions: those stay in the simulation, on the processor or on a device. Changes are marked
-//! by revisions that are unique in the process, so that each renderer uploads only what it lacks. Cost per frame:
-//! proportional to the changes by cuts; nothing without a cut.
+//! by revisions that are unique in the process, so that each renderer uploads only what it lacks. Cost per frame: a pass
+//! over the triangles in frames with a cut; nothing without one.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -13,6 +13,7 @@ use incise::scene::{ColliderSpec, GroundSpec};
 use incise::{Scene, Simulation};
 
 use crate::palette::{self, Legend, decades, legend_from};
+use crate::rims::rims;
 use crate::{ColorBy, RenderError, stretch};
 
 /// Color word of a triangle that is drawn as tissue.
@@ -53,6 +54,8 @@ const NONE: u32 = 0;
 #[derive(Clone, Debug)]
 pub struct RenderScene {
     skin: Skin,
+    /// For each triangle its edges on the rim of a cut: see [`rims`].
+    rims: Vec<u32>,
     /// Color of each triangle; empty if all are drawn as tissue.
     colors: Vec<u32>,
     shown: ColorBy,
@@ -84,6 +87,7 @@ impl RenderScene {
     pub fn new(simulation: &Simulation, scene: &Scene) -> Self {
         let mut render_scene = Self {
             skin: Skin::default(),
+            rims: Vec::new(),
             colors: Vec::new(),
             shown: ColorBy::Tissue,
             made_for: None,
@@ -135,6 +139,7 @@ impl RenderScene {
         if colored {
             self.coloring = revision();
         }
+        self.rims = rims(&self.skin);
         self.topology = revision();
         self.plan = self.topology;
     }
@@ -143,6 +148,7 @@ impl RenderScene {
     /// solver settings. Until the next step, positions are those of the host. O(tets).
     pub fn reset(&mut self, simulation: &Simulation) {
         self.skin = Skin::new(simulation.boundary());
+        self.rims = rims(&self.skin);
         self.topology = revision();
         self.plan = self.topology;
         self.coloring = self.topology;
@@ -272,6 +278,11 @@ impl RenderScene {
     #[must_use]
     pub fn skin(&self) -> &Skin {
         &self.skin
+    }
+
+    /// For each triangle its edges on the rim of a cut: bit k for the edge opposite to corner k.
+    pub(crate) fn rims(&self) -> &[u32] {
+        &self.rims
     }
 
     /// Color of each triangle in sRGB from the last [`RenderScene::color`]; `None` for one that is drawn as tissue.

@@ -23,6 +23,8 @@ const SKY: Vec3 = Vec3::new(0.50, 0.54, 0.60);
 const EARTH: Vec3 = Vec3::new(0.235, 0.205, 0.195);
 const KEY: Vec3 = Vec3::new(1.12, 1.06, 0.96);
 const LINE: Vec3 = Vec3::new(0.012, 0.012, 0.018);
+/// Factor of the distance from the rim of a cut, which makes its line wider than those of other edges.
+pub(crate) const RIM: f32 = 0.5;
 const TABLE: Vec3 = Vec3::new(0.62, 0.635, 0.66);
 const TABLE_LINE: Vec3 = Vec3::new(0.30, 0.32, 0.36);
 const TOP: Vec3 = Vec3::new(0.92, 0.935, 0.955);

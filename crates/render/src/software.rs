@@ -32,6 +32,8 @@ const SAMPLES: [Vec2; 4] = [
 const BAND: usize = 16;
 /// Triangles per parallel task of the projection.
 const CHUNK: usize = 512;
+/// Distance in pixels from an edge that is not drawn.
+const FAR: f32 = 1e6;
 /// Index of an empty sample.
 const NOTHING: u32 = u32::MAX;
 
@@ -225,11 +227,19 @@ impl<'a> Frame<'a> {
                     face,
                 };
                 let color = shading::shade(surface, self.view.light);
-                if self.style.wireframe {
-                    shading::wire(color, self.distances(positions, at))
-                } else {
-                    color
+                let rims = self.render_scene.rims()[triangle];
+                if rims == 0 && !self.style.wireframe {
+                    return color;
                 }
+                let mut distances = self.distances(positions, at);
+                for k in 0..3 {
+                    if rims & 1 << k != 0 {
+                        distances[k] *= shading::RIM;
+                    } else if !self.style.wireframe {
+                        distances[k] = FAR;
+                    }
+                }
+                shading::wire(color, distances)
             }
             Kind::Prop(corners) => {
                 let normal = direction(mix([0, 1, 2].map(|i| Vec3::from_array(corners[i].normal))));
@@ -250,7 +260,7 @@ impl<'a> Frame<'a> {
     fn distances(&self, positions: [Vec3; 3], at: Vec2) -> Vec3 {
         let [Some(a), Some(b), Some(c)] = positions.map(|position| self.view.pixel(position))
         else {
-            return Vec3::splat(1e6);
+            return Vec3::splat(FAR);
         };
         let from = |p: Vec2, q: Vec2| (q - p).perp_dot(at - p).abs() / (q - p).length().max(1e-6);
         Vec3::new(from(b, c), from(c, a), from(a, b))

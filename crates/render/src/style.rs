@@ -83,7 +83,7 @@ pub struct Style {
     /// Quantity shown by the colors. Colors other than of tissue are those of the last
     /// [`RenderScene::color`](crate::RenderScene::color) with this value; triangles without one are drawn as tissue.
     pub color_by: ColorBy,
-    /// Draws the edges of triangles.
+    /// Draws the edges of all triangles; rims of cuts always have a line.
     pub wireframe: bool,
     /// Shades the outer surface smoothly; otherwise each triangle is flat.
     pub smooth: bool,

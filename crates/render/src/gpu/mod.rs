@@ -223,6 +223,7 @@ impl GpuRenderer {
             upload.parts.raw().as_entire_binding(),
             upload.sums.raw().as_entire_binding(),
             upload.colors.raw().as_entire_binding(),
+            upload.rims.raw().as_entire_binding(),
         ];
         let ground = [
             BindingResource::TextureView(&self.dark.views[0]),

@@ -66,6 +66,7 @@ pub(super) struct Upload {
     pub(super) parts: Buffer<[f32; 4]>,
     pub(super) sums: Buffer<[i32; 3]>,
     pub(super) colors: Buffer<u32>,
+    pub(super) rims: Buffer<u32>,
     pub(super) count: Buffer<[u32; 4]>,
     pub(super) props: Buffer<PropCorner>,
     pub(super) planes: Buffer<PlaneNumbers>,
@@ -87,6 +88,7 @@ impl Upload {
             parts: Buffer::new(gpu, "origins", storage)?,
             sums: Buffer::new(gpu, "normals", storage | BufferUsages::COPY_SRC)?,
             colors: Buffer::new(gpu, "colors", storage)?,
+            rims: Buffer::new(gpu, "rims of cuts", storage)?,
             count: Buffer::new(gpu, "count of triangles", uniform)?,
             props: Buffer::new(gpu, "obstacles", BufferUsages::VERTEX)?,
             planes: Buffer::new(gpu, "planes", BufferUsages::VERTEX)?,
@@ -96,7 +98,8 @@ impl Upload {
 
     /// Bytes uploaded since its creation.
     pub(super) fn sent(&self) -> u64 {
-        let skin = self.vertices.sent() + self.triangles.sent() + self.count.sent();
+        let triangles = self.triangles.sent() + self.rims.sent() + self.count.sent();
+        let skin = self.vertices.sent() + triangles;
         let bodies = skin + self.positions.sent() + self.parts.sent() + self.colors.sent();
         let planes = self.planes.sent() + self.ground.sent();
         bodies + self.view.sent() + self.props.sent() + planes
@@ -183,6 +186,7 @@ impl Upload {
         let vertices: Vec<[u32; 2]> = skin.vertices().iter().map(vertex).collect();
         self.vertices.replace(gpu, &vertices)?;
         self.triangles.replace(gpu, skin.triangles())?;
+        self.rims.replace(gpu, render_scene.rims())?;
         self.sums.resize(gpu, vertices.len())?;
         let triangles = count(skin.triangles().len());
         self.count.replace(gpu, &[[triangles, 0, 0, 0]])?;

@@ -244,3 +244,42 @@ fn pictures_shrink_and_survive_files() {
     ));
     assert!(picture.write_png(folder.path().join("none/a.png")).is_err());
 }
+
+/// A box on its own that is cut in frame 1 and stays closed, seen from above.
+#[test]
+fn a_closed_cut_shows_as_a_line() {
+    let picture = |frames: usize| {
+        let mut shown = Shown::new(
+            r#"
+            [[body]]
+            shape = { kind = "box", tets = 600 }
+            [[stroke]]
+            kind = "plane"
+            frame = 1
+            point = [0.03, 0.0, 0.0]
+            normal = [1.0, 0.0, 0.0]
+            "#,
+            1,
+        );
+        let mut camera = shown.camera();
+        // Image columns go along x.
+        (camera.azimuth, camera.elevation) = (-std::f64::consts::FRAC_PI_2, 1.5);
+        shown.advance(frames);
+        let pieces = shown.simulation.report().pieces;
+        let picture = draw(&shown, &camera, &Style::default(), [160, 120]);
+        let light = |x: u32| {
+            let [r, g, b] = picture.pixel(x, 60).map(u32::from);
+            r + g + b
+        };
+        (pieces, (0..160).map(light).collect::<Vec<_>>())
+    };
+    let ((before, whole), (after, cut)) = (picture(0), picture(1));
+    assert_eq!((before, after), (1, 2));
+    let dark = |x: &usize| 4 * cut[*x] < 3 * whole[*x];
+    let columns: Vec<usize> = (0..160).filter(dark).collect();
+    // In the middle, a little to the right, and as wide as a line.
+    assert!(
+        (1..=3).contains(&columns.len()) && columns.iter().all(|x| (80..95).contains(x)),
+        "{columns:?}"
+    );
+}
