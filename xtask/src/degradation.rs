@@ -60,7 +60,7 @@ pub(crate) struct DegradationArguments {
         default_value = "0,0.1,0.2"
     )]
     snaps: Vec<f64>,
-    /// Improve the mesh after each stroke, in the scene that `--scene` writes.
+    /// Improve the mesh where strokes cut what earlier ones have cut, in the scene that `--scene` writes.
     #[arg(long)]
     improve: bool,
     /// Write the scene of the strokes to this file and measure nothing; `incise run FILE --out DIR` renders it.
