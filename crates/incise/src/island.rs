@@ -157,7 +157,7 @@ fn too_heavy(
         let weight = spec.density * gravity.abs().dot(size) / stiffest;
         let moves = joined.fixed[particles].iter().any(|fixed| !fixed);
         (moves && weight > LARGEST_WEIGHT)
-            .then(|| Warning::of_weight(body, size.max_element(), weight))
+            .then(|| Warning::of_weight(body, size.max_element(), spec.scale, weight))
     };
     bodies(joined).filter_map(warning).collect()
 }

@@ -144,12 +144,14 @@ impl Warning {
         Self::new(WarningCode::ThinCollider, &[body], message)
     }
 
-    /// The warning about a body of `size` m that the pressure of its weight, `weight` times its Young's modulus, crushes.
-    pub(crate) fn of_weight(body: usize, size: f64, weight: f64) -> Self {
+    /// The warning about a body of `size` m, of a mesh scaled by `scale`, that the pressure of its weight, `weight` times its
+    /// Young's modulus, crushes.
+    pub(crate) fn of_weight(body: usize, size: f64, scale: f64, weight: f64) -> Self {
         let message = format!(
             "it is {} m large, and the pressure of its weight is {weight:.0} times its Young's modulus, so it collapses: raise \
-             young_modulus, or set scale = 0.001 if its lengths are in mm",
-            rounded(size)
+             young_modulus, or set scale = {} if its lengths are in mm",
+            rounded(size),
+            rounded(0.001 * scale)
         );
         Self::new(WarningCode::TooHeavy, &[body], message)
     }

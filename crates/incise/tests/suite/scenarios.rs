@@ -337,6 +337,8 @@ fn a_body_that_its_weight_crushes_is_named() {
                     let warning = warning.unwrap_or_else(|| panic!("no warning: {text}"));
                     assert_eq!(warning.location, "body 0");
                     assert!(warning.message.contains(weight), "{warning}");
+                    // A thousandth of the one that the scene has.
+                    assert!(warning.message.contains("set scale = 0.2 if"), "{warning}");
                 }
                 _ => assert!(warning.is_none(), "{text}, frame {frame}"),
             }
