@@ -9,6 +9,7 @@ const SKY = vec3<f32>(0.50, 0.54, 0.60);
 const EARTH = vec3<f32>(0.235, 0.205, 0.195);
 const KEY = vec3<f32>(1.12, 1.06, 0.96);
 const LINE = vec3<f32>(0.012, 0.012, 0.018);
+// Factor of the distance from the rim of a cut.
 const RIM: f32 = 0.5;
 const TOP = vec3<f32>(0.92, 0.935, 0.955);
 const BOTTOM = vec3<f32>(0.66, 0.69, 0.73);

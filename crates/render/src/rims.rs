@@ -28,11 +28,11 @@ pub(crate) fn rims(skin: &Skin) -> Vec<u32> {
     for p in skin.outer_triangles().flat_map(particles) {
         is_outer[p.index()] = true;
     }
-    let ends = |edge: &[ParticleId; 2]| edge.iter().all(|p| is_outer[p.index()]);
+    let ends_outside = |edge: &[ParticleId; 2]| edge.iter().all(|p| is_outer[p.index()]);
     let of_cuts: HashSet<[ParticleId; 2]> = skin
         .cut_triangles()
         .flat_map(|triangle| edges(particles(triangle)))
-        .filter(ends)
+        .filter(ends_outside)
         .collect();
     for triangle in skin.outer_triangles() {
         for (k, [from, to]) in edges(particles(triangle)).into_iter().enumerate() {
@@ -46,32 +46,27 @@ pub(crate) fn rims(skin: &Skin) -> Vec<u32> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeMap;
-
     use glam::DVec3;
-    use incise::cutting::{CutOptions, CuttableMesh, FaceTag, Plane, Sweep, cut_plane};
+    use incise::cutting::{CutOptions, CuttableMesh, Plane, Sweep, cut_plane};
     use incise::mesh::kuhn_box;
+    use proptest::prelude::*;
 
     use super::*;
 
-    /// The slow way: each edge with all triangles that have it, in either direction.
+    /// The slow way, from the other side: an edge of an outer triangle is on a rim if no other outer triangle has it.
     fn slow(skin: &Skin) -> Vec<u32> {
-        let mut around: BTreeMap<[ParticleId; 2], Vec<(usize, usize)>> = BTreeMap::new();
-        for (triangle, corners) in skin.triangles().iter().enumerate() {
-            let p = corners.map(|v| skin.vertices()[v as usize].particle);
-            for k in 0..3 {
-                let mut ends = [p[(k + 1) % 3], p[(k + 2) % 3]];
-                ends.sort_unstable();
-                around.entry(ends).or_default().push((triangle, k));
-            }
-        }
+        let outer = skin.outer_triangles();
+        let particles = |triangle: usize| {
+            skin.triangles()[triangle].map(|v| skin.vertices()[v as usize].particle)
+        };
         let mut rims = vec![0; skin.triangles().len()];
-        for sides in around.values() {
-            assert_eq!(sides.len(), 2, "these cuts leave no edge with four faces");
-            let outer = |side: &&(usize, usize)| skin.tag(side.0) == FaceTag::Outer;
-            let mut outer = sides.iter().filter(outer);
-            if let (Some((triangle, k)), None) = (outer.next(), outer.next()) {
-                rims[*triangle] |= 1 << k;
+        for triangle in outer.clone() {
+            let p = particles(triangle);
+            for k in 0..3 {
+                let ends = [p[(k + 1) % 3], p[(k + 2) % 3]];
+                let has = |other: usize| ends.iter().all(|end| particles(other).contains(end));
+                let goes_on = outer.clone().any(|other| other != triangle && has(other));
+                rims[triangle] |= u32::from(!goes_on) << k;
             }
         }
         rims
@@ -114,5 +109,29 @@ mod tests {
         assert_eq!(rims(&skin), slow(&skin));
         let both = rims(&skin).iter().filter(|bits| **bits != 0).count();
         assert!(through > 40 && both > through + 10, "{through}, {both}");
+    }
+
+    fn direction() -> impl Strategy<Value = DVec3> {
+        let any = prop::array::uniform3(-1.0..1.0_f64).prop_map(DVec3::from_array);
+        any.prop_filter("a direction", |v| v.length() > 0.1)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn planes_across_each_other_have_the_rims_of_the_slow_way(
+            normals in prop::collection::vec(direction(), 2..4),
+            snap in prop::sample::select(vec![0.0, 0.1, 0.25]),
+        ) {
+            let mut body = body();
+            for (tag, normal) in (0..).zip(normals) {
+                let rest = body.mesh().positions.clone();
+                let plane = Plane { point: DVec3::splat(0.48), normal };
+                let options = CutOptions { snap, tag, ..CutOptions::default() };
+                cut_plane(&mut body, &rest, &plane, &options).unwrap();
+            }
+            let skin = Skin::new(body.boundary());
+            prop_assert_eq!(rims(&skin), slow(&skin));
+        }
     }
 }
