@@ -29,7 +29,7 @@
 //! over all of them once these are more than a quarter.
 
 use glam::DVec3;
-use incise_cutting::{BoundaryTriangle, CutDelta, CuttableMesh};
+use incise_cutting::{AddedTet, BoundaryTriangle, CutDelta, CuttableMesh, RemovedTet};
 use incise_mesh::{Bounds, ParticleId, TetId};
 use rayon::prelude::*;
 
@@ -356,15 +356,10 @@ impl ContactDetector {
         for source in &delta.copies {
             self.body_of.push(self.body_of[source.index()]);
         }
+        if delta.is_improvement() {
+            self.location_is_due |= !self.follow_improvement(mesh, delta);
+        }
         let is_deleted = |tet: TetId| delta.deleted.binary_search_by_key(&tet, |d| d.tet).is_ok();
-        // Other tets take over the volume of those that an improvement deletes or flips.
-        let is_flipped = |tet: TetId| {
-            let removed = delta.removed.binary_search_by_key(&tet, |gone| gone.tet);
-            delta.flipped > 0 && removed.is_ok()
-        };
-        let mut inside = self.inside.iter();
-        self.location_is_due |=
-            delta.is_improvement() && inside.any(|(_, tet)| is_deleted(*tet) || is_flipped(*tet));
         self.inside.retain(|(_, tet)| !is_deleted(*tet));
         for (_, tet) in &mut self.inside {
             *tet = delta.slot_after(*tet);
@@ -375,8 +370,36 @@ impl ContactDetector {
         let triangles = delta.surface_removed.iter().chain(&delta.surface_added);
         let corners = triangles.flat_map(|triangle| triangle.particles);
         self.changed.extend(corners.map(|p| p.0));
-        // Improvement moves particles. Where parts do not touch themselves, those that came apart may touch anywhere.
-        self.search_is_due |= delta.is_improvement() || !self.settings.self_contact;
+        // Where parts do not touch themselves, those that came apart may touch anywhere.
+        self.search_is_due |= !self.settings.self_contact;
+    }
+
+    /// Gives the vertices inside of tets that an improvement deletes or flips the new tet that has the center of theirs at
+    /// rest, since new tets fill the place of the old ones. False if there is none.
+    fn follow_improvement(&mut self, mesh: &CuttableMesh, delta: &CutDelta) -> bool {
+        let rest = &mesh.mesh().positions;
+        let place = |corners: [ParticleId; 4]| corners.map(|p| rest[p.index()]);
+        let mut all_are_found = true;
+        for (_, tet) in &mut self.inside {
+            let gone = |of: &[RemovedTet]| {
+                let number = of.binary_search_by_key(tet, |gone| gone.tet);
+                number.ok().map(|i| of[i].corners)
+            };
+            let flipped = || (delta.flipped > 0).then(|| gone(&delta.removed)).flatten();
+            let Some(corners) = gone(&delta.deleted).or_else(flipped) else {
+                continue;
+            };
+            let center = place(corners).iter().sum::<DVec3>() / 4.0;
+            let has_center = |added: &&AddedTet| {
+                let inside = Barycentric::new(place(added.corners));
+                inside.is_some_and(|inside| inside.of(center).iter().all(|x| *x >= 0.0))
+            };
+            match delta.added.iter().find(has_center) {
+                Some(added) => *tet = added.tet,
+                None => all_are_found = false,
+            }
+        }
+        all_are_found
     }
 
     /// Takes the last cut or removal back; `mesh` is the one before it. Pairs that it ended do not come back, those that

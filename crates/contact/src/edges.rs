@@ -112,7 +112,12 @@ impl EdgeContact {
 
 /// The unit normal to two directions that are not parallel.
 fn across(one: DVec3, other: DVec3) -> Option<DVec3> {
-    let across = one.normalize_or_zero().cross(other.normalize_or_zero());
+    across_units(one.normalize_or_zero(), other.normalize_or_zero())
+}
+
+/// The unit normal to two unit vectors that are not parallel.
+fn across_units(one: DVec3, other: DVec3) -> Option<DVec3> {
+    let across = one.cross(other);
     let sine = across.length();
     (sine > PARALLEL).then(|| across / sine)
 }
@@ -172,6 +177,8 @@ struct Feature {
 #[derive(Clone, Copy, Debug)]
 struct Wedge {
     ends: [DVec3; 2],
+    /// The unit vector from the first end to the second.
+    along: DVec3,
     /// From the edge into each of the triangles, across the edge.
     inward: [DVec3; 2],
 }
@@ -408,7 +415,11 @@ fn wedge(query: &Query<'_>, edge: &Feature) -> Option<Wedge> {
     let inward = [normals[0].cross(along), normals[1].cross(-along)];
     let is_sound = edge.slots.iter().all(|&slot| shape.is_sound(slot));
     let is_convex = normals[0].dot(inward[1]) < -FLAT;
-    (is_sound && is_convex).then_some(Wedge { ends, inward })
+    (is_sound && is_convex).then_some(Wedge {
+        ends,
+        along,
+        inward,
+    })
 }
 
 fn contact(
@@ -417,6 +428,26 @@ fn contact(
     (other, two): (&Feature, &Wedge),
     has_passed: bool,
 ) -> Option<EdgeContact> {
+    let crossed = across_units(one.along, two.along)?;
+    // The first edge lies above the second, with its triangles going up and those of the second going down. Few edges within
+    // reach do, so this comes first.
+    let is_above = |normal: DVec3| {
+        let up = |wedge: &Wedge| wedge.inward.map(|inward| inward.dot(normal));
+        up(one).iter().all(|up| *up >= -BENT) && up(two).iter().all(|up| *up <= BENT)
+    };
+    let normal = match [is_above(crossed), is_above(-crossed)] {
+        [true, false] => crossed,
+        [false, true] => -crossed,
+        _ => return None,
+    };
+    let [p, q] = closest_on_segments(one.ends, two.ends);
+    let distance = p.distance(q);
+    let reach = query
+        .reach
+        .of(approach(query.steps, &edge.ends, &other.ends));
+    if (distance > reach && !has_passed) || distance.is_nan() {
+        return None;
+    }
     let shares = |p: &u32| other.ends.contains(p);
     let mut ends = edge.ends.iter();
     if ends.any(|&p| shares(&p) || query.pairs.partners(ParticleId(p)).any(|p| shares(&p.0))) {
@@ -426,25 +457,6 @@ fn contact(
     if !query.may_edges_touch(tets, [edge.ends, other.ends]) {
         return None;
     }
-    let [p, q] = closest_on_segments(one.ends, two.ends);
-    let distance = p.distance(q);
-    let reach = query
-        .reach
-        .of(approach(query.steps, &edge.ends, &other.ends));
-    if (distance > reach && !has_passed) || distance.is_nan() {
-        return None;
-    }
-    let normal = across(one.ends[1] - one.ends[0], two.ends[1] - two.ends[0])?;
-    // The first edge lies above the second, with its triangles going up and those of the second going down.
-    let is_above = |normal: DVec3| {
-        let up = |wedge: &Wedge| wedge.inward.map(|inward| inward.dot(normal));
-        up(one).iter().all(|up| *up >= -BENT) && up(two).iter().all(|up| *up <= BENT)
-    };
-    let normal = match [is_above(normal), is_above(-normal)] {
-        [true, false] => normal,
-        [false, true] => -normal,
-        _ => return None,
-    };
     let [a, b] = edge.ends;
     let [c, d] = other.ends;
     let contact = EdgeContact {
@@ -459,7 +471,6 @@ fn contact(
         // At rest parts do not overlap: edges that have passed each other there are those of a wall.
         let at_rest = &query.state.mesh.mesh().positions;
         let [x1, x2, x3, x4] = contact.particles.map(|p| at_rest[p as usize]);
-        let crossed = across(one.ends[1] - one.ends[0], two.ends[1] - two.ends[0])?;
         let turned = across(x2 - x1, x4 - x3).map(|turned| turned * crossed.dot(normal).signum());
         let before = turned.map(|normal| EdgeContact { normal, ..contact }.gap(at_rest));
         if before.is_some_and(|before| before < AS_AT_REST * gap) {

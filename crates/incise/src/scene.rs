@@ -363,12 +363,6 @@ with!(
 );
 
 impl Scene {
-    /// Whether meshes are improved after strokes. With contact cut faces would have to stay, and what is inside of pieces is
-    /// not worth it: ten slices and 25 sweeps across each other had as many tets with it as without.
-    pub(crate) fn improves(&self) -> bool {
-        self.cutting.improve && self.contact.is_none()
-    }
-
     /// The built-in scene: a generated liver held at one side, sliced by a moving blade.
     ///
     /// # Panics

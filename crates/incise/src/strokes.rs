@@ -77,7 +77,7 @@ impl Timeline {
         Self {
             tolerance,
             crumbs: scene.cutting.crumbs,
-            improves: scene.improves(),
+            improves: scene.cutting.improve,
             ..Self::default()
         }
     }

@@ -15,7 +15,7 @@ pub struct CuttingSpec {
     /// Whether particles that cuts created are taken out again where a stroke cuts what an earlier one has cut, so that
     /// cuts of cuts do not make ever smaller tets: where the mesh is better or as good without them, in frames without a
     /// blade on its way, some in each. Cut faces stay within a twentieth of an edge of where they were cut. A single stroke
-    /// leaves its mesh as it cut it, and so do all strokes in a scene with contact, where cut faces must not move.
+    /// leaves its mesh as it cut it.
     pub improve: bool,
 }
 

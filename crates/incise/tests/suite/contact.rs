@@ -41,7 +41,7 @@ fn cut_at_rest(
 ) -> Vec<(Vec<u64>, Vec<DVec3>)> {
     let mut builder = Simulation::builder();
     builder.solver(solver(precision, 4)).threads(threads);
-    // Improvement leaves cut faces as they are where there is contact, so the meshes would be different ones.
+    // With contact more of the mesh is improved in a frame, so the meshes would be different ones.
     builder.cutting(CuttingSpec::default().with(|spec| spec.improve = false));
     builder.add_body(cube(DVec3::ZERO));
     if contact {

@@ -3,7 +3,7 @@
 use incise::mesh::glam::{DVec3, dvec3};
 use incise::mesh::{TetId, TetMesh, kuhn_box};
 use incise::scene::{
-    AttachmentSpec, ColliderSpec, ContactSpec, PathRotationSpec, Precision, Region,
+    AttachmentSpec, ColliderSpec, ContactSpec, CuttingSpec, PathRotationSpec, Precision, Region,
 };
 use incise::{Body, Simulation};
 
@@ -227,6 +227,55 @@ fn a_hundred_slices_fall_into_a_bowl() {
     simulation.check().unwrap();
 }
 
+/// A block is cut across earlier cuts while it stands on the ground, its mesh is improved, and it falls apart: no vertex of a
+/// piece ends inside of another one, and contacts are less deep than without improvement, which leaves thinner tets.
+#[test]
+fn improved_pieces_stay_out_of_each_other() {
+    let run = |improve: bool, precision: Precision| {
+        let mut builder = Simulation::builder();
+        builder
+            .gravity(GRAVITY)
+            .ground(0.0, 0.3)
+            .solver(solver(precision, 20))
+            .contact(with_friction(0.2))
+            .cutting(CuttingSpec::default().with(|spec| spec.improve = improve));
+        builder.add_body(cube(DVec3::ZERO).young_modulus(3e4).damping(0.01));
+        let center = DVec3::splat(0.12);
+        let normals = [
+            dvec3(1.0, 0.1, 0.7),
+            dvec3(-0.2, 1.0, 0.6),
+            dvec3(1.0, -0.1, -0.6),
+            dvec3(0.1, 1.0, -0.8),
+        ];
+        for (frame, normal) in (2..).step_by(5).zip(normals) {
+            builder.add_stroke(cut(frame, center + 0.03 * normal, normal));
+        }
+        let mut simulation = builder.build().unwrap();
+        let (mut collapsed, mut deepest) = (0, 0.0_f64);
+        for _ in 0..250 {
+            let report = simulation.step().unwrap();
+            assert_eq!(report.repaired, 0);
+            collapsed += report.cut.as_ref().map_or(0, |cut| cut.collapsed);
+            deepest = deepest.max(report.contact.unwrap().max_depth);
+        }
+        simulation.check().unwrap();
+        let contact = simulation.report().contact.unwrap();
+        assert!(contact.active > 10 && contact.buried == 0, "{contact:?}");
+        if improve {
+            // A twentieth of an edge of the cells.
+            assert_eq!(intruders(&simulation, 3e-3), 0, "{precision:?}");
+        }
+        (collapsed, simulation.report().pieces, deepest)
+    };
+    for precision in [Precision::F32, Precision::F64] {
+        let (none, pieces, plain) = run(false, precision);
+        let (collapsed, same, improved) = run(true, precision);
+        assert!(none == 0 && collapsed > 100, "{collapsed}");
+        assert_eq!(pieces, same);
+        assert!(improved < plain, "{improved} of an edge, {plain}");
+    }
+}
+
 /// Pinned bodies beside each other have no contacts between them, and a free one rests on both.
 #[test]
 fn pinned_bodies_have_no_contacts_of_their_own() {
@@ -265,16 +314,20 @@ fn pinned_bodies_have_no_contacts_of_their_own() {
 /// Another hash means another result for every user: change it only together with a line in the changelog.
 #[test]
 fn results_with_contact_are_those_of_the_last_version() {
-    for (precision, golden) in [
-        (Precision::F32, 0xf595_0c21_eda5_50d6),
-        (Precision::F64, 0xd3b2_b8dd_cd3c_1c71),
+    for (precision, improve, golden) in [
+        (Precision::F32, false, 0xf595_0c21_eda5_50d6),
+        (Precision::F64, false, 0xd3b2_b8dd_cd3c_1c71),
+        (Precision::F32, true, 0x676e_39d7_ae86_e5ca),
+        (Precision::F64, true, 0x6f32_8a9d_05f5_b75d),
     ] {
         for threads in [1, 3] {
-            let mut simulation = busy(precision, threads).build().unwrap();
+            let mut builder = busy(precision, threads);
+            builder.cutting(CuttingSpec::default().with(|spec| spec.improve = improve));
+            let mut simulation = builder.build().unwrap();
             steps(&mut simulation, 25);
             assert!(simulation.report().contact.unwrap().active > 10);
             let hash = hash(state(&simulation));
-            assert!(hash == golden, "{precision:?} gives {hash:#018x}");
+            assert!(hash == golden, "{precision:?}, {improve}: {hash:#018x}");
         }
     }
 }

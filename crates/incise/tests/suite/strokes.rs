@@ -515,7 +515,7 @@ fn planes_at_the_largest_snap_distance_leave_no_single_tets() {
 }
 
 /// Close slices of two bodies, with and without improvement: fewer tets and as many pieces, all derived data is current,
-/// and a snapshot restores the state before. With contact the cut faces stay, and with them what lies on them.
+/// and a snapshot restores the state before.
 #[test]
 fn improvement_after_strokes_keeps_everything_current() {
     for contact in ["", "[contact]\n"] {
@@ -557,15 +557,11 @@ fn improvement_after_strokes_keeps_everything_current() {
         };
         let (none, _, grown, pieces, volume) = run("[cutting]\nimprove = false");
         let (collapsed, merged, tets, same, kept) = run("");
-        assert!(none == 0 && tets <= grown);
-        // Scenes with contact have no improvement.
-        assert_eq!(collapsed > 0 && merged > 0, contact.is_empty());
-        if contact.is_empty() {
-            assert!(
-                5 * tets < 3 * grown,
-                "{tets} of {grown}, {collapsed} taken out"
-            );
-        }
+        assert!(none == 0 && collapsed > 0 && merged > 0);
+        assert!(
+            5 * tets < 3 * grown,
+            "{tets} of {grown}, {collapsed} taken out"
+        );
         assert_eq!(pieces, same);
         assert!((kept / volume - 1.0).abs() < 1e-12);
     }
@@ -660,12 +656,10 @@ fn improvement_keeps_contact_across_fresh_cuts() {
             .map(|contact| contact.candidates);
         (collapsed, farthest, candidates)
     };
-    let ((none, still, plain), (_, moved, improved)) = (run(false), run(true));
-    assert_eq!(none, 0);
+    let ((none, still, plain), (collapsed, moved, improved)) = (run(false), run(true));
+    assert!(none == 0 && collapsed > 20, "{collapsed}");
     assert!(moved < still + 1e-9, "{still} {moved}");
+    // Cut faces have fewer particles, but are not without contact.
     let [plain, improved] = [plain.unwrap(), improved.unwrap()];
-    assert!(
-        plain > 0 && 10 * improved.abs_diff(plain) <= plain,
-        "{plain} {improved}"
-    );
+    assert!(2 * improved > plain, "{plain} {improved}");
 }
