@@ -24,9 +24,9 @@
 //! twins. A search is a refit of the trees, a query for each vertex that is due and for each feature edge, one for each
 //! triangle that has moved, and a short one for each other vertex of parts that have, on all threads but for the triangles. A
 //! delta costs what the boundary lost and gained. The first search also looks for vertices that start inside of other
-//! parts, among all tets. The search after a cut is for the vertices of triangles that came or went and those near them, and
-//! for all where that is much of the surface or parts do not touch themselves; it builds a tree over the new triangles, and
-//! over all of them once these are more than a quarter.
+//! parts, among all tets. The search after a cut, or after an improvement of the mesh, is for the vertices of triangles that came or
+//! went and those near them, and for all where that is much of the surface or parts do not touch themselves; it builds a tree
+//! over the new triangles, and over all of them once these are more than a quarter.
 
 use glam::DVec3;
 use incise_cutting::{AddedTet, BoundaryTriangle, CutDelta, CuttableMesh, RemovedTet};
@@ -374,8 +374,8 @@ impl ContactDetector {
         self.search_is_due |= !self.settings.self_contact;
     }
 
-    /// Gives the vertices inside of tets that an improvement deletes or flips the new tet that has the center of theirs at
-    /// rest, since new tets fill the place of the old ones. False if there is none.
+    /// Where an improvement deletes or flips a tet with vertices inside, lists for them the new tet that contains the center of
+    /// the old one at rest; the next search goes on from there. False if there is none.
     fn follow_improvement(&mut self, mesh: &CuttableMesh, delta: &CutDelta) -> bool {
         let rest = &mesh.mesh().positions;
         let place = |corners: [ParticleId; 4]| corners.map(|p| rest[p.index()]);
