@@ -132,7 +132,12 @@ pub fn jones_plassmann(conflicts: &impl Conflicts) -> Scgc {
 /// Adding a shortcut never adds a round, and adding shortcut 3 to shortcut 1 never saves one.
 #[must_use]
 pub fn scgc_with(conflicts: &impl Conflicts, shortcuts: Shortcuts) -> Scgc {
-    in_chunks(conflicts, shortcuts, GRAIN)
+    let color = || in_chunks(conflicts, shortcuts, GRAIN);
+    // From outside of a pool each parallel loop would wait for one of its threads.
+    match conflicts.vertex_count() > GRAIN {
+        true => rayon::scope(|_| color()),
+        false => color(),
+    }
 }
 
 /// Vertices per task at least: a visit takes nanoseconds, starting a task microseconds.

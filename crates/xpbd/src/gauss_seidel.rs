@@ -16,6 +16,7 @@ use std::ops::Range;
 
 use fearless_simd::{Level, Simd, SimdBase, dispatch};
 
+use crate::layout::Layout;
 use crate::pace::Pace;
 use crate::simd_kernel::{
     Access, Alone, Block, BlockKernel, Buffers, Damping, Pass, PlainSplit, Sequential, Shared,
@@ -132,19 +133,13 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
     sharing: &mut Sharing<R>,
 ) {
     let layout = pass.layout;
-    let threads = rayon::current_num_threads();
-    let chunks = |color: usize| match layout.block_count_of(color) {
-        0 => 0,
-        blocks => {
-            let groups = layout.groups_of(color).len();
-            (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups))
-        }
-    };
-    let colors = layout.color_count();
-    if threads == 1 || (0..colors).all(|color| chunks(color) < 2) {
+    if !has_work_for_several(layout) {
         alone::<R, S, K>(simd, pass, cells);
         return;
     }
+    let threads = rayon::current_num_threads();
+    let chunks = |color: usize| chunk_count(layout, color, threads);
+    let colors = layout.color_count();
     let Sharing {
         pace,
         cells: cells_there,
@@ -209,6 +204,23 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
             }
         });
     });
+}
+
+/// The number of threads that a color is divided among.
+fn chunk_count<R: Float>(layout: &Layout<R>, color: usize, threads: usize) -> usize {
+    match layout.block_count_of(color) {
+        0 => 0,
+        blocks => {
+            let groups = layout.groups_of(color).len();
+            (blocks / BLOCKS_A_THREAD).clamp(1, threads.min(groups))
+        }
+    }
+}
+
+/// Whether there are several threads, and a color large enough for two of them.
+pub(crate) fn has_work_for_several<R: Float>(layout: &Layout<R>) -> bool {
+    let threads = rayon::current_num_threads();
+    threads > 1 && (0..layout.color_count()).any(|color| chunk_count(layout, color, threads) > 1)
 }
 
 /// A part of a range from 0 on, one of several of about the same size.
@@ -422,6 +434,7 @@ mod tests {
         let run = |threads: usize, form: Option<TetSolve>| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("threads start").install(|| {
+                assert_eq!(has_work_for_several(layout), threads > 1);
                 let mut cells = moved(if form.is_some() { 1.0 } else { 0.0 });
                 for _ in 0..3 {
                     let mut sharing = Sharing::new(Pace::of_threads_that_gain());

@@ -169,12 +169,22 @@ impl<R: Float> Particles<R> {
         weight != before
     }
 
-    /// Moves every free particle by its velocity for `time`, after gravity has changed that by `change`.
-    pub(crate) fn predict(&mut self, change: Option<R::Vector>, time: R) {
-        let cells = self.cells.par_chunks(PARALLEL_PARTICLES);
+    /// Particles that a thread is given at once: all of them unless they are `shared` by several threads.
+    fn chunk(&self, shared: bool) -> usize {
+        match shared {
+            true => PARALLEL_PARTICLES,
+            false => self.cells.len().max(1),
+        }
+    }
+
+    /// Moves every free particle by its velocity for `time`, after gravity has changed that by `change`. `shared` says
+    /// whether on several threads.
+    pub(crate) fn predict(&mut self, change: Option<R::Vector>, time: R, shared: bool) {
+        let chunk = self.chunk(shared);
+        let cells = self.cells.par_chunks(chunk);
         cells
-            .zip(self.previous.par_chunks_mut(PARALLEL_PARTICLES))
-            .zip(self.velocities.par_chunks_mut(PARALLEL_PARTICLES))
+            .zip(self.previous.par_chunks_mut(chunk))
+            .zip(self.velocities.par_chunks_mut(chunk))
             .for_each(|((cells, previous), velocities)| {
                 for ((cell, previous), velocity) in cells.iter().zip(previous).zip(velocities) {
                     let x = load::<R>(cell);
@@ -189,17 +199,19 @@ impl<R: Float> Particles<R> {
             });
     }
 
-    /// Adds the corrections to the velocities; returns how many particles had to be put back.
+    /// Adds the corrections to the velocities; returns how many particles had to be put back. `shared` says whether on
+    /// several threads.
     ///
     /// In exact numbers the velocity is the motion over the time. But positions are rounded, and a velocity taken from
     /// them would be wrong by their last digit over the time: in single precision a body in free fall would lose a
     /// hundredth of its speed, and far from the origin it would hang in the air. The prediction, computed again to the
     /// same bits, tells what part of the motion is correction; without correction the velocity stays as it is.
-    pub(crate) fn update_velocities(&mut self, time: R, per_time: R) -> usize {
-        let cells = self.cells.par_chunks(PARALLEL_PARTICLES);
+    pub(crate) fn update_velocities(&mut self, time: R, per_time: R, shared: bool) -> usize {
+        let chunk = self.chunk(shared);
+        let cells = self.cells.par_chunks(chunk);
         cells
-            .zip(self.previous.par_chunks(PARALLEL_PARTICLES))
-            .zip(self.velocities.par_chunks_mut(PARALLEL_PARTICLES))
+            .zip(self.previous.par_chunks(chunk))
+            .zip(self.velocities.par_chunks_mut(chunk))
             .map(|((cells, previous), velocities)| {
                 let mut repaired = 0;
                 for ((cell, previous), velocity) in cells.iter().zip(previous).zip(velocities) {

@@ -7,6 +7,7 @@ use std::ops::Range;
 
 use incise_graph::Schedule;
 
+use crate::team::in_pool_if;
 use crate::{
     CoarseCorrection, Float, Solver, StepReport, StepSettings, VbdReport, VbdSettings, VertexStars,
     XpbdError,
@@ -58,8 +59,7 @@ macro_rules! real {
                 correction: Option<&mut CoarseCorrection<Self>>,
                 settings: &VbdSettings,
             ) -> Result<VbdReport, XpbdError> {
-                // On a thread of the pool from the start: each parallel loop would wake one otherwise.
-                rayon::scope(|_| match correction {
+                in_pool_if(true, || match correction {
                     None => solver.frame_of_sweeps(stars, settings),
                     Some(correction) => solver.frame_of_corrections(stars, correction, settings),
                 })

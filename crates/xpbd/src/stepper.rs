@@ -18,10 +18,10 @@ use crate::forces::ForceMeter;
 use crate::gauss_seidel::{self, Sharing};
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
-use crate::particles::Particles;
+use crate::particles::{PARALLEL_PARTICLES, Particles};
 use crate::simd_kernel::Pass;
 use crate::substep::Substep;
-use crate::team::keep_awake;
+use crate::team::{in_pool_if, keep_awake};
 use crate::tets::TetSet;
 use crate::{Float, Method, StepSettings, TetSolve};
 
@@ -138,7 +138,9 @@ impl<R: Float> Stepper<R> {
         }
         self.last.clear();
         let (mut repaired, ends) = (0, part.end == settings.substeps);
-        let is_shared = self.sharing.pace.is_shared();
+        let is_large = particles.len() > PARALLEL_PARTICLES
+            || gauss_seidel::has_work_for_several(&tets.layout);
+        let shared = self.sharing.pace.is_shared();
         let substeps = || {
             for number in part {
                 let keep = keep && number + 1 == settings.substeps;
@@ -147,11 +149,10 @@ impl<R: Float> Stepper<R> {
                 repaired += self.substep(particles, tets, constraints, meter, &substep, keep);
             }
         };
-        if is_shared {
-            keep_awake(substeps);
-        } else {
-            substeps();
-        }
+        in_pool_if(is_large, || match shared {
+            true => keep_awake(substeps),
+            false => substeps(),
+        });
         particles.refused.clear();
         self.meter = meter;
         if ends {
@@ -172,7 +173,8 @@ impl<R: Float> Stepper<R> {
         let settings = substep.settings;
         let time = settings.substep_time();
         let gravity = settings.gravity.map(|g| R::from_dvec3(g * time));
-        particles.predict(gravity, R::from_f64(time));
+        let shared = self.sharing.pace.is_shared();
+        particles.predict(gravity, R::from_f64(time), shared);
         if let Some(meter) = meter.as_deref_mut() {
             meter.begin(particles);
         }
@@ -205,7 +207,8 @@ impl<R: Float> Stepper<R> {
             meter.take_moved(particles, constraints, 1.0 / time);
             meter.take_refused(particles, 1.0 / time);
         }
-        let repaired = particles.update_velocities(R::from_f64(time), substep.factors.per_time);
+        let per_time = substep.factors.per_time;
+        let repaired = particles.update_velocities(R::from_f64(time), per_time, shared);
         constraints.end(particles, substep);
         if let Some(meter) = meter.as_deref_mut() {
             meter.end(particles, settings.gravity, time);

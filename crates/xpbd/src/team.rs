@@ -43,6 +43,15 @@ impl Drop for InFrame {
     }
 }
 
+/// Runs `work` on a thread of the present rayon pool, if it is large. From outside of the pool each parallel loop in it
+/// would hand its work to a thread of the pool and sleep until that has ended, some 30 µs each time.
+pub(crate) fn in_pool_if<T: Send>(is_large: bool, work: impl FnOnce() -> T + Send) -> T {
+    match is_large {
+        true => rayon::scope(|_| work()),
+        false => work(),
+    }
+}
+
 /// Runs `frame`, and meanwhile keeps the other threads of the present rayon pool looking for work: each of them until it
 /// has found none for half a millisecond. A thread without work lets other programs have its core.
 pub(crate) fn keep_awake<T>(frame: impl FnOnce() -> T) -> T {
@@ -251,6 +260,16 @@ impl<C: Fn(usize) -> usize, W: Fn(usize, usize)> Drop for EndOfChunk<'_, '_, C, 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Large work goes to a thread of the pool, once; small work stays, and so does what is in the pool already.
+    #[test]
+    fn large_work_is_done_in_the_pool() {
+        use rayon::current_thread_index as number;
+        assert_eq!(number(), None);
+        let inside = in_pool_if(true, || (number(), in_pool_if(true, number)));
+        assert!(inside.0.is_some() && inside.0 == inside.1);
+        assert_eq!(in_pool_if(false, number), None);
+    }
 
     /// Every chunk once, and none before all of the round before it.
     #[test]

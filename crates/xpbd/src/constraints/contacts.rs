@@ -54,6 +54,7 @@ use incise_graph::{Coloring, GraphError};
 use super::ConstraintKind;
 use crate::direction::{absolute, direction};
 use crate::float::{load, store, weight};
+use crate::pace::Pace;
 use crate::particles::{Particles, number};
 use crate::substep::Substep;
 use crate::team::parallel_rounds;
@@ -669,6 +670,9 @@ pub(crate) struct Contacts<R: Float> {
     /// Force in N for an impulse.
     #[cfg_attr(feature = "serde", serde(skip))]
     per_impulse: f64,
+    /// Whether several threads pay.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pace: Pace,
 }
 
 impl<R: Float> Default for Contacts<R> {
@@ -683,6 +687,7 @@ impl<R: Float> Default for Contacts<R> {
             multipliers: Vec::new(),
             impulses: Vec::new(),
             per_impulse: 0.0,
+            pace: Pace::default(),
         }
     }
 }
@@ -1179,6 +1184,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
         else {
             return;
         };
+        let mut pace = std::mem::take(&mut self.pace);
         let this = &*self;
         let threads = rayon::current_num_threads();
         let chunks = |round: usize| {
@@ -1203,15 +1209,23 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
             }
         };
         let rounds = this.rounds.len();
-        if threads == 1 || (0..rounds).all(|round| chunks(round) < 2) {
+        let alone = || {
             for round in 0..rounds {
                 for chunk in 0..chunks(round) {
                     work(round, chunk);
                 }
             }
+        };
+        if threads == 1 || (0..rounds).all(|round| chunks(round) < 2) {
+            alone();
         } else {
-            parallel_rounds(rounds, chunks, work);
+            let contacts = this.pairs.len() + this.surfaces.len();
+            pace.run(contacts, |is_shared| match is_shared {
+                true => parallel_rounds(rounds, chunks, work),
+                false => alone(),
+            });
         }
+        self.pace = pace;
     }
 
     fn bytes(&self) -> usize {

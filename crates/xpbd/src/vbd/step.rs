@@ -191,7 +191,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
         };
         let time = R::from_f64(implicit_time);
         let gravity = own.gravity.map(|g| R::from_dvec3(g * own_time));
-        solver.particles.predict(gravity, time);
+        solver.particles.predict(gravity, time, true);
         let ended = f64::from(substep.number) / f64::from(substep.count);
         let Constraints {
             attachments,
@@ -266,7 +266,7 @@ impl<'a, R: Float> ImplicitStep<'a, R> {
             constraints,
             ..
         } = self.solver;
-        let repaired = particles.update_velocities(self.time, per_time);
+        let repaired = particles.update_velocities(self.time, per_time, true);
         constraints
             .attachments
             .update_rigid_attachments(particles, per_time);
