@@ -42,9 +42,12 @@
 //! form a tail that one thread solves, since a vertex that touches dozens of triangles needs dozens of colors of few
 //! contacts each.
 //!
+//! Most contacts of a substep are open by far. A test of squares, without a root or a division, leaves them out before
+//! anything else is computed ([`Contact::is_clear`]); where rounding could matter it does not decide.
+//!
 //! Source: Macklin et al. 2019 and Müller et al. 2020 (detection by frames, friction of positions); the split of old and
-//! new overlap is that of Giles, Diaz and Yuksel 2025 with a time in place of a factor. Cost: about 100 operations a
-//! contact apart, 160 one that presses.
+//! new overlap is that of Giles, Diaz and Yuksel 2025 with a time in place of a factor. Cost: about 50 operations a
+//! contact apart, 200 one that presses.
 
 use std::ops::Range;
 
@@ -71,6 +74,8 @@ const PARALLEL: f64 = 0.01;
 /// The square of the depth under both planes at an edge up to which the one acts that takes less to satisfy, in lengths of
 /// the edge.
 const SLIGHT: f64 = 1e-4;
+/// A contact is clear beyond so many roundings.
+const CLEARANCE: f64 = 64.0;
 /// One over how many times the part of an overlap that is taken back a particle may be moved by.
 const PER_MOVE: f64 = 0.25;
 
@@ -284,6 +289,8 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
     /// triangle has no normal.
     fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
+    /// Whether it is open beyond all rounding, so that [`Contact::gap`] need not be asked. False says nothing.
+    fn is_clear(&self, x: [R::Vector; K]) -> bool;
     /// The first or the second plane; `None` where a triangle has no normal.
     fn plane(&self, x: [R::Vector; K], is_second: bool) -> Option<ContactPlane<R, K>>;
     /// Whether the first particle is above or below the other side, not beside it.
@@ -393,6 +400,11 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
             residual: new_part(value, before, kept),
             is_past: false,
         })
+    }
+
+    #[inline]
+    fn is_clear(&self, x: [R::Vector; 2]) -> bool {
+        R::dot(self.normal, x[1] - x[0]) >= R::ZERO
     }
 
     #[inline]
@@ -572,6 +584,43 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
         }
         gap.is_past = !gap.is_open() && self.is_past(now);
         Some(gap)
+    }
+
+    /// Compares squares of heights, without a root or a division.
+    #[inline]
+    fn is_clear(&self, x: [R::Vector; 4]) -> bool {
+        let square = |v: R::Vector| R::dot(v, v);
+        let rounding = R::from_f64(CLEARANCE * CLEARANCE) * R::EPSILON * R::EPSILON;
+        if self.is_edges {
+            let [a, b, c] = self.beyond;
+            let along = |way: R::Vector| R::dot(R::vector(a, b, c), way);
+            let ways = [x[0] - x[2], x[1] - x[0], x[2] - x[3]];
+            // Of all pairs of points on both edges the least.
+            let [between, first, second] = ways.map(along);
+            let least = between - self.thickness;
+            let least = if first < R::ZERO {
+                least + first
+            } else {
+                least
+            };
+            let least = if second < R::ZERO {
+                least + second
+            } else {
+                least
+            };
+            let [q, u, v] = ways.map(square);
+            return least > R::ZERO
+                && least * least > rounding * (q + u + v + self.thickness * self.thickness);
+        }
+        let [e1, e2, r] = basis::<R>(x);
+        let area = R::cross(e1, e2);
+        let height = R::dot(area, r);
+        let [q, u, v] = [r, e1, e2].map(square);
+        let thickness = self.thickness * self.thickness;
+        height > R::ZERO
+            && height * height
+                > (thickness + thickness) * square(area)
+                    + rounding * (q + u + v + thickness) * u * v
     }
 
     #[inline]
@@ -964,6 +1013,9 @@ impl<R: Float> Contacts<R> {
         let numbers = contact.particles();
         let cells = numbers.map(|p| &particles.cells[p as usize]);
         let mut x = cells.map(|cell| load::<R>(cell));
+        if self.multipliers.is_empty() && contact.is_clear(x) {
+            return;
+        }
         let previous = numbers.map(|p| particles.previous[p as usize]);
         let Some(mut gap) = contact.gap(x, previous, factors.kept) else {
             return;
@@ -1232,3 +1284,6 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
         size_of_val(&*self.pairs) + size_of_val(&*self.surfaces) + size_of_val(&*self.rounds)
     }
 }
+
+#[cfg(test)]
+mod tests;
