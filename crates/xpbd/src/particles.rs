@@ -181,19 +181,20 @@ impl<R: Float> Particles<R> {
     /// whether on several threads.
     pub(crate) fn predict(&mut self, change: Option<R::Vector>, time: R, shared: bool) {
         let chunk = self.chunk(shared);
-        let cells = self.cells.par_chunks(chunk);
+        let cells = self.cells.par_chunks_mut(chunk);
         cells
             .zip(self.previous.par_chunks_mut(chunk))
             .zip(self.velocities.par_chunks_mut(chunk))
             .for_each(|((cells, previous), velocities)| {
-                for ((cell, previous), velocity) in cells.iter().zip(previous).zip(velocities) {
-                    let x = load::<R>(cell);
-                    *previous = x;
-                    if weight::<R>(cell) > R::ZERO {
+                for ((cell, previous), velocity) in cells.iter_mut().zip(previous).zip(velocities) {
+                    let [x, y, z, weight] = R::read_alone(cell);
+                    *previous = R::vector(x, y, z);
+                    if weight > R::ZERO {
                         if let Some(change) = change {
                             *velocity += change;
                         }
-                        store::<R>(cell, x + *velocity * time);
+                        let [x, y, z] = R::components(*previous + *velocity * time);
+                        R::write_alone(cell, [x, y, z, weight]);
                     }
                 }
             });
@@ -208,24 +209,26 @@ impl<R: Float> Particles<R> {
     /// same bits, tells what part of the motion is correction; without correction the velocity stays as it is.
     pub(crate) fn update_velocities(&mut self, time: R, per_time: R, shared: bool) -> usize {
         let chunk = self.chunk(shared);
-        let cells = self.cells.par_chunks(chunk);
+        let cells = self.cells.par_chunks_mut(chunk);
         cells
             .zip(self.previous.par_chunks(chunk))
             .zip(self.velocities.par_chunks_mut(chunk))
             .map(|((cells, previous), velocities)| {
                 let mut repaired = 0;
-                for ((cell, previous), velocity) in cells.iter().zip(previous).zip(velocities) {
-                    if weight::<R>(cell) <= R::ZERO {
+                for ((cell, previous), velocity) in cells.iter_mut().zip(previous).zip(velocities) {
+                    let [x, y, z, weight] = R::read_alone(cell);
+                    let x = R::vector(x, y, z);
+                    if weight <= R::ZERO {
                         *velocity = R::Vector::default();
                         // Held, it gets no share of any correction, but no share of an infinite one is not a number.
-                        if !finite::<R>(load::<R>(cell)) {
+                        if !finite::<R>(x) {
                             store::<R>(cell, *previous);
                             repaired += 1;
                         }
                         continue;
                     }
                     let predicted = *previous + *velocity * time;
-                    let speed = *velocity + (load::<R>(cell) - predicted) * per_time;
+                    let speed = *velocity + (x - predicted) * per_time;
                     let finite = finite::<R>(speed);
                     *velocity = if finite { speed } else { R::Vector::default() };
                     if !finite {
