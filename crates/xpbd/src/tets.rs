@@ -127,18 +127,19 @@ impl<R: Float> TetSet<R> {
         tet
     }
 
-    /// Puts the tets into the order of a schedule, in blocks of so many lanes, unless they are.
+    /// Puts the tets into the order of a schedule, in blocks of so many lanes; if they are, into fewer blocks where that pays.
     pub(crate) fn update_layout(
         &mut self,
         particles: &Particles<R>,
         schedule: &Schedule,
         lanes: usize,
     ) {
-        if self.layout.fits(schedule) {
-            return;
-        }
         let mut layout = std::mem::take(&mut self.layout);
-        self.update(&mut layout, particles, schedule, lanes);
+        if layout.fits(schedule) {
+            layout.compact(schedule, |t| self.ingredients(particles, t));
+        } else {
+            self.update(&mut layout, particles, schedule, lanes);
+        }
         self.layout = layout;
     }
 

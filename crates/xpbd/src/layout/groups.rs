@@ -33,6 +33,8 @@ pub(super) struct Usage {
     depth: u32,
     /// The group that takes new clusters.
     open: u32,
+    /// Whether rebuilding the groups is known not to be worth it.
+    pub(super) is_settled: bool,
 }
 
 impl Usage {
@@ -41,6 +43,7 @@ impl Usage {
         blocks: 0,
         depth: 0,
         open: NONE,
+        is_settled: true,
     };
 
     /// Whether rebuilding the groups is worth it. A color that was just built has no more than `tets / lanes + depth`

@@ -52,6 +52,8 @@ pub(crate) struct Layout<R> {
     /// Tets in the layout that have changed since, and for each tet whether it is listed.
     dirty: Vec<u32>,
     marked: Vec<bool>,
+    /// Calls of [`Layout::compact`] since the last change.
+    calm: u32,
     /// Working memory.
     clusters: Vec<ClusterId>,
     order: ClusterOrder,
@@ -67,6 +69,7 @@ impl<R: Float> Default for Layout<R> {
             slots: Vec::new(),
             dirty: Vec::new(),
             marked: Vec::new(),
+            calm: 0,
             clusters: Vec::new(),
             order: ClusterOrder::default(),
         }

@@ -4,6 +4,7 @@ use glam::{DQuat, DVec3};
 use incise_graph::{ClusterId, Clustering, ColorId, Coloring, Schedule};
 
 use super::blocks::metric_factor;
+use super::update::{CALM, SPARE};
 use super::*;
 use crate::Material;
 use crate::neo_hookean::TetConstraint;
@@ -235,6 +236,49 @@ fn another_schedule_is_laid_out() {
             .update(&equal, LANES, true, Vec::new, ingredients),
         250
     );
+}
+
+/// In calm frames each color comes to the blocks that it needs, a color a frame, and then nothing is done. Changes and calm
+/// frames in turn do not rebuild all again and again.
+#[test]
+fn calm_frames_leave_no_idle_lanes() {
+    let clusters = 600;
+    let (mut plan, mut rebuilt) = (Plan::new(clusters), 0);
+    for round in 0..40 {
+        for i in 0..60 {
+            let k = (round * 60 + i) * 7 % clusters;
+            plan.recolor(ClusterId(k), (i * i + round) % 40);
+            plan.replace((round * 60 + i) * 11 % (5 * clusters), (7 * i + round) % 32);
+        }
+        let all = plan.clustering.constraint_count();
+        rebuilt += usize::from(plan.update() >= all);
+        let blocks =
+            |plan: &Plan| -> u32 { plan.layout.groups.usages.iter().map(|u| u.blocks).sum() };
+        let (before, largest) = (blocks(&plan), |plan: &Plan| {
+            let tets = plan.layout.groups.usages.iter().map(|u| u.tets);
+            tets.max().unwrap_or(0) as usize
+        });
+        for call in 0.. {
+            let filled = plan.layout.compact(&plan.schedule, ingredients);
+            assert!(filled <= largest(&plan), "more than a color");
+            plan.layout.check(&plan.schedule, ingredients).unwrap();
+            if call >= CALM && filled == 0 {
+                break;
+            }
+            assert!(
+                call < CALM + 41 && (call + 1 >= CALM || filled == 0),
+                "{call}"
+            );
+        }
+        assert!(round > 20 || blocks(&plan) < before, "round {round}");
+        for color in 0..plan.schedule.color_count() {
+            let clusters = plan.schedule.clusters(color);
+            let needed = plan.layout.blocks_needed(clusters, &plan.schedule);
+            let found = plan.layout.block_count_of(color);
+            assert!(found >= needed && SPARE * found <= (SPARE + 1) * needed);
+        }
+    }
+    assert!(rebuilt <= 4, "{rebuilt} times");
 }
 
 /// A sliver a hundred thousand times as wide as thick does not move along its thin direction, in which its gradients

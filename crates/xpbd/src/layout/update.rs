@@ -4,6 +4,9 @@
 //! each thread solves one part of space. Later a changed cluster stays in its lane if its color is the same and its group
 //! has enough blocks. Otherwise it goes to the group of its color that was opened last, or opens one.
 //!
+//! Where nothing has changed for some frames, one color a frame is rebuilt that has a sixteenth more blocks than it needs, until
+//! none has: cuts leave a third of the lanes idle.
+//!
 //! Bounds: a color is rebuilt if its blocks exceed three halves of what a rebuilt one can need; all is rebuilt if
 //! groups without clusters have half of all blocks. Both rebuilds cost at most what caused them, up to a factor of the
 //! lanes times the size of a cluster.
@@ -16,6 +19,11 @@ use incise_graph::{ClusterId, LaneGroup, Schedule};
 use super::groups::Usage;
 use super::{Ingredients, Layout, NONE, index};
 use crate::Float;
+
+/// Calls without a change before colors are rebuilt that have some blocks too many: cuts go on for a while.
+pub(super) const CALM: u32 = 4;
+/// A color is rebuilt in calm frames if one of so many blocks too many is there.
+pub(super) const SPARE: usize = 16;
 
 impl<R: Float> Layout<R> {
     /// Makes this the layout of a schedule; returns how many tets were filled in. `uniform` says that all tets have the
@@ -137,11 +145,63 @@ impl<R: Float> Layout<R> {
         touched.dedup();
         for color in touched {
             if self.groups.usages[color].is_wasteful(self.blocks.lanes) {
-                self.close_color(color, schedule);
-                filled += self.build_color(color, schedule, ingredients);
+                filled += self.rebuild_color(color, schedule, ingredients);
+            } else {
+                self.groups.usages[color].is_settled = false;
             }
         }
+        self.calm = 0;
         self.groups.set_color_count(schedule.color_count());
+        self.groups.lanes.tidy();
+        filled
+    }
+
+    /// Rebuilds a color that has more blocks than it needs, after some calls without a change; returns how many tets were
+    /// filled in.
+    pub(crate) fn compact(
+        &mut self,
+        schedule: &Schedule,
+        ingredients: impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        self.calm = self.calm.saturating_add(1);
+        if self.calm < CALM {
+            return 0;
+        }
+        for color in 0..schedule.color_count() {
+            if self.groups.usages[color].is_settled {
+                continue;
+            }
+            let needed = self.blocks_needed(schedule.clusters(color), schedule);
+            if SPARE * self.block_count_of(color) > (SPARE + 1) * needed {
+                return self.rebuild_color(color, schedule, &ingredients);
+            }
+            self.groups.usages[color].is_settled = true;
+        }
+        0
+    }
+
+    /// The blocks of clusters that are put into groups by size.
+    pub(super) fn blocks_needed(&mut self, clusters: &[ClusterId], schedule: &Schedule) -> usize {
+        let mut by_size = std::mem::take(&mut self.clusters);
+        by_size.clear();
+        by_size.extend_from_slice(clusters);
+        let size = |cluster: ClusterId| schedule.constraints(cluster).len();
+        by_size.sort_unstable_by_key(|&cluster| Reverse(size(cluster)));
+        let groups = by_size.chunks(self.blocks.lanes);
+        let blocks = groups.map(|group| size(group[0])).sum();
+        self.clusters = by_size;
+        blocks
+    }
+
+    /// Makes the groups of a color anew.
+    fn rebuild_color(
+        &mut self,
+        color: usize,
+        schedule: &Schedule,
+        ingredients: &impl Fn(u32) -> Ingredients<R>,
+    ) -> usize {
+        self.close_color(color, schedule);
+        let filled = self.build_color(color, schedule, ingredients);
         self.groups.lanes.tidy();
         filled
     }
