@@ -289,7 +289,7 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
     /// triangle has no normal.
     fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
-    /// Whether it is open beyond all rounding, so that [`Contact::gap`] need not be asked. False says nothing.
+    /// True for a contact that is open beyond all rounding, so that [`Contact::gap`] need not be asked. False says nothing.
     fn is_clear(&self, x: [R::Vector; K]) -> bool;
     /// The first or the second plane; `None` where a triangle has no normal.
     fn plane(&self, x: [R::Vector; K], is_second: bool) -> Option<ContactPlane<R, K>>;

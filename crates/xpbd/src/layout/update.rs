@@ -193,7 +193,7 @@ impl<R: Float> Layout<R> {
         blocks
     }
 
-    /// Makes the groups of a color anew.
+    /// Removes the groups of a color and makes new ones.
     fn rebuild_color(
         &mut self,
         color: usize,
