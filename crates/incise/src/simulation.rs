@@ -256,6 +256,9 @@ impl Simulation {
 
     /// Advances by one frame and reports on it.
     ///
+    /// A scene of 10,000 tets or more is computed on a thread of the present rayon pool, also when called from outside of it,
+    /// so that what is local to the calling thread, such as a subscriber of `tracing`, is not seen there.
+    ///
     /// # Errors
     /// If a stroke cannot be carried out (bodies that it has not cut yet are unchanged), or the device is lost or out of
     /// memory.
