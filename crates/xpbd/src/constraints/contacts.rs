@@ -596,18 +596,9 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
             let along = |way: R::Vector| R::dot(R::vector(a, b, c), way);
             let ways = [x[0] - x[2], x[1] - x[0], x[2] - x[3]];
             // Of all pairs of points on both edges the least.
-            let [between, first, second] = ways.map(along);
-            let least = between - self.thickness;
-            let least = if first < R::ZERO {
-                least + first
-            } else {
-                least
-            };
-            let least = if second < R::ZERO {
-                least + second
-            } else {
-                least
-            };
+            let [between, ends @ ..] = ways.map(along);
+            let lower = |least, way| if way < R::ZERO { least + way } else { least };
+            let least = ends.into_iter().fold(between - self.thickness, lower);
             let [q, u, v] = ways.map(square);
             return least > R::ZERO
                 && least * least > rounding * (q + u + v + self.thickness * self.thickness);
