@@ -47,9 +47,9 @@ use crate::particles::add_to;
 use crate::substep::Factors;
 use crate::{Float, TetSolve};
 pub(crate) use memory::{
-    Access, Alone, Buffers, Shared, exchange, read_all, read_changed, write_lanes,
+    Access, Alone, Buffers, Shared, exchange, read_all, read_changed, splat, write_lanes,
 };
-use memory::{gathered, load_multipliers, put, shift, splat, store_multipliers};
+use memory::{gathered, load_multipliers, put, shift, store_multipliers};
 
 /// The input of a pass over the tets.
 #[derive(Clone, Copy, Debug)]
@@ -981,12 +981,15 @@ fn corner_changes<R: Float, S: Simd>(
 }
 
 #[inline(always)]
-fn dot<R: Float, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> R::Lanes<S> {
+pub(crate) fn dot<R: Float, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> R::Lanes<S> {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-fn cross<R: Float, S: Simd>(a: &[R::Lanes<S>; 3], b: &[R::Lanes<S>; 3]) -> [R::Lanes<S>; 3] {
+pub(crate) fn cross<R: Float, S: Simd>(
+    a: &[R::Lanes<S>; 3],
+    b: &[R::Lanes<S>; 3],
+) -> [R::Lanes<S>; 3] {
     [
         a[1] * b[2] - b[1] * a[2],
         a[2] * b[0] - b[2] * a[0],
@@ -1054,4 +1057,4 @@ fn product<R: Float, S: Simd>(a: &Matrix<R::Lanes<S>>, b: &Matrix<R::Lanes<S>>) 
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

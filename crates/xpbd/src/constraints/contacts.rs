@@ -40,17 +40,17 @@
 //!
 //! Colors are solved one after the other, pairs before the others; contacts of a color beyond the sixteenth of their kind
 //! form a tail that one thread solves, since a vertex that touches dozens of triangles needs dozens of colors of few
-//! contacts each.
-//!
-//! Most contacts of a substep are open by far. A test of squares, without a root or a division, leaves them out before
-//! anything else is computed ([`Contact::is_clear`]); where rounding could matter it does not decide.
+//! contacts each. Contacts of a color are solved several at once ([`lanes`]).
 //!
 //! Source: Macklin et al. 2019 and Müller et al. 2020 (detection by frames, friction of positions); the split of old and
 //! new overlap is that of Giles, Diaz and Yuksel 2025 with a time in place of a factor. Cost: about 50 operations a
 //! contact apart, 200 one that presses.
 
+mod lanes;
+
 use std::ops::Range;
 
+use fearless_simd::Level;
 use glam::DVec3;
 use incise_graph::{Coloring, GraphError};
 
@@ -74,8 +74,6 @@ const PARALLEL: f64 = 0.01;
 /// The square of the depth under both planes at an edge up to which the one acts that takes less to satisfy, in lengths of
 /// the edge.
 const SLIGHT: f64 = 1e-4;
-/// A contact is clear beyond so many roundings.
-const CLEARANCE: f64 = 64.0;
 /// One over how many times the part of an overlap that is taken back a particle may be moved by.
 const PER_MOVE: f64 = 0.25;
 
@@ -289,8 +287,6 @@ trait Contact<R: Float, const K: usize>: Copy + Sync {
     /// From positions now and at the start of the substep and the part of an old overlap that is left; `None` where a
     /// triangle has no normal.
     fn gap(&self, x: [R::Vector; K], previous: [R::Vector; K], kept: R) -> Option<Gap<R, K>>;
-    /// True for a contact that is open beyond all rounding, so that [`Contact::gap`] need not be asked. False says nothing.
-    fn is_clear(&self, x: [R::Vector; K]) -> bool;
     /// The first or the second plane; `None` where a triangle has no normal.
     fn plane(&self, x: [R::Vector; K], is_second: bool) -> Option<ContactPlane<R, K>>;
     /// Whether the first particle is above or below the other side, not beside it.
@@ -400,11 +396,6 @@ impl<R: Float> Contact<R, 2> for Pair<R> {
             residual: new_part(value, before, kept),
             is_past: false,
         })
-    }
-
-    #[inline]
-    fn is_clear(&self, x: [R::Vector; 2]) -> bool {
-        R::dot(self.normal, x[1] - x[0]) >= R::ZERO
     }
 
     #[inline]
@@ -586,34 +577,6 @@ impl<R: Float> Contact<R, 4> for Surface<R> {
         Some(gap)
     }
 
-    /// Compares squares of heights, without a root or a division.
-    #[inline]
-    fn is_clear(&self, x: [R::Vector; 4]) -> bool {
-        let square = |v: R::Vector| R::dot(v, v);
-        let rounding = R::from_f64(CLEARANCE * CLEARANCE) * R::EPSILON * R::EPSILON;
-        if self.is_edges {
-            let [a, b, c] = self.beyond;
-            let along = |way: R::Vector| R::dot(R::vector(a, b, c), way);
-            let ways = [x[0] - x[2], x[1] - x[0], x[2] - x[3]];
-            // Of all pairs of points on both edges the least.
-            let [between, ends @ ..] = ways.map(along);
-            let lower = |least, way| if way < R::ZERO { least + way } else { least };
-            let least = ends.into_iter().fold(between - self.thickness, lower);
-            let [q, u, v] = ways.map(square);
-            return least > R::ZERO
-                && least * least > rounding * (q + u + v + self.thickness * self.thickness);
-        }
-        let [e1, e2, r] = basis::<R>(x);
-        let area = R::cross(e1, e2);
-        let height = R::dot(area, r);
-        let [q, u, v] = [r, e1, e2].map(square);
-        let thickness = self.thickness * self.thickness;
-        height > R::ZERO
-            && height * height
-                > (thickness + thickness) * square(area)
-                    + rounding * (q + u + v + thickness) * u * v
-    }
-
     #[inline]
     fn plane(&self, x: [R::Vector; 4], is_second: bool) -> Option<ContactPlane<R, 4>> {
         if self.is_edges {
@@ -684,6 +647,31 @@ struct Round {
     to: usize,
 }
 
+/// Memory that is of use while contacts are set only.
+#[derive(Debug)]
+struct Room {
+    /// The numbers of the contacts in the order of their colors.
+    order: Vec<usize>,
+    /// Of each color the place of its next contact.
+    next: Vec<usize>,
+    /// Of each particle the mark of the last color that it was seen in.
+    seen: Vec<u64>,
+    /// The mark of the next color.
+    first: u64,
+}
+
+impl Default for Room {
+    fn default() -> Self {
+        Self {
+            order: Vec::new(),
+            next: Vec::new(),
+            seen: Vec::new(),
+            // Particles that were not seen have 0.
+            first: 1,
+        }
+    }
+}
+
 /// The contacts of a solver.
 #[derive(Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -695,11 +683,10 @@ pub(crate) struct Contacts<R: Float> {
     pairs: Vec<Pair<R>>,
     surfaces: Vec<Surface<R>>,
     rounds: Vec<Round>,
-    /// Of each kind.
-    colors: [usize; 2],
-    /// For each particle a bit for each color that it has; of use while contacts are set only.
+    /// Of pairs and of surfaces where each color ends.
+    ends: [Vec<usize>; 2],
     #[cfg_attr(feature = "serde", serde(skip))]
-    taken: Vec<u32>,
+    room: Room,
     /// Of each contact, pairs first: the impulse of friction and the multiplier of the substep; only while a step has
     /// more than one iteration.
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -722,8 +709,8 @@ impl<R: Float> Default for Contacts<R> {
             pairs: Vec::new(),
             surfaces: Vec::new(),
             rounds: Vec::new(),
-            colors: [0; 2],
-            taken: Vec::new(),
+            ends: [Vec::new(), Vec::new()],
+            room: Room::default(),
             multipliers: Vec::new(),
             impulses: Vec::new(),
             per_impulse: 0.0,
@@ -740,48 +727,112 @@ impl<R: Float> Clone for Contacts<R> {
             pairs: self.pairs.clone(),
             surfaces: self.surfaces.clone(),
             rounds: self.rounds.clone(),
-            colors: self.colors,
+            ends: self.ends.clone(),
             ..Self::default()
         }
     }
 }
 
-/// Replaces `out` by `list` in the order of `colors`, the tail last, and appends the rounds.
-fn arrange<T, U: Copy>(
+/// Replaces `out` by `list` in the order of `colors` and `ends` by where each color ends, and appends the rounds.
+///
+/// # Errors
+/// A contact that is refused, a particle that does not exist or is named twice, or two contacts of a color on one particle.
+fn arrange<T, U, const K: usize>(
     list: &[T],
     colors: &Coloring,
+    numbers: impl Fn(&T) -> [u32; K],
     convert: impl Fn(usize, &T) -> Result<U, XpbdError>,
-    out: &mut Vec<U>,
+    (out, ends): (&mut Vec<U>, &mut Vec<usize>),
     rounds: &mut Vec<Round>,
-    is_pairs: bool,
+    room: &mut Room,
 ) -> Result<(), XpbdError> {
     out.clear();
-    let Some(first) = list.first() else {
-        return Ok(());
-    };
-    out.resize(list.len(), convert(0, first)?);
-    let round = |c: usize| colors.color(c).index().min(PARALLEL_COLORS);
-    let mut ends = [0; PARALLEL_COLORS + 1];
-    (0..list.len()).for_each(|c| ends[round(c)] += 1);
+    ends.clear();
+    ends.resize(colors.color_count(), 0);
+    let color_of = |c: usize| colors.color(c).index();
+    (0..list.len()).for_each(|c| ends[color_of(c)] += 1);
+    let Room {
+        order,
+        next,
+        seen,
+        first,
+    } = room;
+    next.clear();
+    let mut to = 0;
+    for end in &mut *ends {
+        next.push(to);
+        to += *end;
+        *end = to;
+    }
+    order.clear();
+    order.resize(list.len(), 0);
+    for c in 0..list.len() {
+        let place = &mut next[color_of(c)];
+        order[*place] = c;
+        *place += 1;
+    }
+    for &c in &*order {
+        see(seen, *first + color_of(c) as u64, list, c, &numbers, colors)?;
+        out.push(convert(c, &list[c])?);
+    }
+    *first += colors.color_count() as u64;
+    let is_pairs = K == 2;
+    let tail = PARALLEL_COLORS.min(ends.len());
     let mut from = 0;
-    let mut next = [0; PARALLEL_COLORS + 1];
-    for (color, count) in ends.into_iter().enumerate() {
-        next[color] = from;
-        let to = from + count;
-        if count > 0 {
+    let mut round = |to: usize, is_tail| {
+        if from < to {
             rounds.push(Round {
                 is_pairs,
-                is_tail: color == PARALLEL_COLORS,
+                is_tail,
                 from,
                 to,
             });
         }
         from = to;
-    }
-    for (c, contact) in list.iter().enumerate() {
-        let place = &mut next[round(c)];
-        out[*place] = convert(c, contact)?;
-        *place += 1;
+    };
+    ends[..tail].iter().for_each(|&end| round(end, false));
+    round(list.len(), true);
+    Ok(())
+}
+
+/// Marks the particles of a contact by a number of its color.
+fn see<T, const K: usize>(
+    seen: &mut [u64],
+    mark: u64,
+    list: &[T],
+    constraint: usize,
+    numbers: impl Fn(&T) -> [u32; K],
+    colors: &Coloring,
+) -> Result<(), XpbdError> {
+    let particles = seen.len();
+    let of_contact = numbers(&list[constraint]);
+    let color = colors.color(constraint);
+    for (k, &particle) in of_contact.iter().enumerate() {
+        if of_contact[..k].contains(&particle) {
+            return Err(refuse(GraphError::RepeatedParticle {
+                constraint,
+                particle,
+            }));
+        }
+        let Some(seen) = seen.get_mut(particle as usize) else {
+            return Err(refuse(GraphError::ParticleOutOfRange {
+                constraint,
+                particle,
+                particles,
+            }));
+        };
+        if *seen == mark {
+            let is_other =
+                |c: &usize| colors.color(*c) == color && numbers(&list[*c]).contains(&particle);
+            let other = (0..constraint).find(is_other).unwrap_or(constraint);
+            return Err(refuse(GraphError::SharedParticle {
+                first: number(other),
+                second: number(constraint),
+                color,
+                particle,
+            }));
+        }
+        *seen = mark;
     }
     Ok(())
 }
@@ -799,7 +850,7 @@ impl<R: Float> Contacts<R> {
 
     /// Number of colors, of pairs and of surfaces together.
     pub(crate) fn color_count(&self) -> usize {
-        self.colors.iter().sum()
+        self.ends.iter().map(Vec::len).sum()
     }
 
     /// Forgets all contacts and their memory.
@@ -844,34 +895,34 @@ impl<R: Float> Contacts<R> {
                 }));
             }
         }
-        self.taken.clear();
-        self.taken.resize(particle_count, 0);
-        let taken = &mut self.taken;
-        take_colors(taken, pairs.0, |c| c.particles, pairs.1, 0)?;
-        take_colors(
-            taken,
-            surfaces.0,
-            SurfaceContact::particles,
-            surfaces.1,
-            PARALLEL_COLORS,
-        )?;
         let Self {
             rounds,
             pairs: own_pairs,
             surfaces: own_surfaces,
+            ends: [pair_ends, surface_ends],
+            room,
             ..
         } = self;
+        room.seen.resize(particle_count, 0);
         rounds.clear();
-        arrange(pairs.0, pairs.1, Pair::new, own_pairs, rounds, true)?;
+        arrange(
+            pairs.0,
+            pairs.1,
+            |pair| pair.particles,
+            Pair::new,
+            (own_pairs, pair_ends),
+            rounds,
+            room,
+        )?;
         arrange(
             surfaces.0,
             surfaces.1,
+            SurfaceContact::particles,
             Surface::new,
-            own_surfaces,
+            (own_surfaces, surface_ends),
             rounds,
-            false,
+            room,
         )?;
-        self.colors = [pairs.1.color_count(), surfaces.1.color_count()];
         // Those of the frame before belong to other contacts.
         self.impulses.clear();
         Ok(())
@@ -993,6 +1044,7 @@ impl<R: Float> Contacts<R> {
         }
     }
 
+    /// Solves a contact alone. [`lanes`] computes the same for several at once.
     #[inline]
     fn solve_one<const K: usize>(
         &self,
@@ -1004,9 +1056,6 @@ impl<R: Float> Contacts<R> {
         let numbers = contact.particles();
         let cells = numbers.map(|p| &particles.cells[p as usize]);
         let mut x = cells.map(|cell| load::<R>(cell));
-        if self.multipliers.is_empty() && contact.is_clear(x) {
-            return;
-        }
         let previous = numbers.map(|p| particles.previous[p as usize]);
         let Some(mut gap) = contact.gap(x, previous, factors.kept) else {
             return;
@@ -1149,58 +1198,6 @@ fn refuse(source: GraphError) -> XpbdError {
     }
 }
 
-/// Marks the colors of contacts at their particles, in bits from `first` on.
-///
-/// # Errors
-/// A particle that does not exist or is named twice, or two contacts of a color on one particle.
-fn take_colors<T, const K: usize>(
-    taken: &mut [u32],
-    contacts: &[T],
-    numbers: impl Fn(&T) -> [u32; K],
-    colors: &Coloring,
-    first: usize,
-) -> Result<(), XpbdError> {
-    let particles = taken.len();
-    for (constraint, contact) in contacts.iter().enumerate() {
-        let (numbers, of_contact) = (numbers(contact), &numbers);
-        let color = colors.color(constraint).index();
-        for (k, &particle) in numbers.iter().enumerate() {
-            if numbers[..k].contains(&particle) {
-                return Err(refuse(GraphError::RepeatedParticle {
-                    constraint,
-                    particle,
-                }));
-            }
-            let Some(bits) = taken.get_mut(particle as usize) else {
-                return Err(refuse(GraphError::ParticleOutOfRange {
-                    constraint,
-                    particle,
-                    particles,
-                }));
-            };
-            if color >= PARALLEL_COLORS {
-                continue;
-            }
-            let bit = 1 << (first + color);
-            if *bits & bit != 0 {
-                let is_other = |c: &usize| {
-                    colors.color(*c).index() == color
-                        && of_contact(&contacts[*c]).contains(&particle)
-                };
-                let other = (0..constraint).find(is_other).unwrap_or(constraint);
-                return Err(refuse(GraphError::SharedParticle {
-                    first: number(other),
-                    second: number(constraint),
-                    color: colors.color(constraint),
-                    particle,
-                }));
-            }
-            *bits |= bit;
-        }
-    }
-    Ok(())
-}
-
 impl<R: Float> ConstraintKind<R> for Contacts<R> {
     fn begin(&mut self, _particles: &Particles<R>, substep: &Substep<'_, R>) -> usize {
         if self.law.is_none() {
@@ -1228,6 +1225,7 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
             return;
         };
         let mut pace = std::mem::take(&mut self.pace);
+        let level = Level::new();
         let this = &*self;
         let threads = rayon::current_num_threads();
         let chunks = |round: usize| {
@@ -1235,19 +1233,20 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
             let most = if round.is_tail { 1 } else { threads };
             ((round.to - round.from) / CONTACTS_A_THREAD).clamp(1, most)
         };
-        let first_surface = this.pairs.len();
         let work = |number: usize, chunk: usize| {
             let (round, chunks) = (this.rounds[number], chunks(number));
             let share = |part: usize| round.from + (round.to - round.from) * part / chunks;
             let range = share(chunk)..share(chunk + 1);
-            if round.is_pairs {
-                for index in range {
-                    this.solve_one(index, &this.pairs[index], particles, factors);
-                }
-            } else {
-                for index in range {
-                    let surface = &this.surfaces[index];
-                    this.solve_one(first_surface + index, surface, particles, factors);
+            let ends = &this.ends[usize::from(!round.is_pairs)];
+            let first = ends.partition_point(|end| *end <= range.start);
+            let mut from = range.start;
+            // A tail has many colors, which one thread solves one after the other.
+            for &end in &ends[first..] {
+                let to = end.min(range.end);
+                lanes::solve(level, this, round.is_pairs, from..to, particles, factors);
+                from = to;
+                if from == range.end {
+                    break;
                 }
             }
         };
@@ -1272,7 +1271,11 @@ impl<R: Float> ConstraintKind<R> for Contacts<R> {
     }
 
     fn bytes(&self) -> usize {
-        size_of_val(&*self.pairs) + size_of_val(&*self.surfaces) + size_of_val(&*self.rounds)
+        let ends = self.ends.iter().map(|ends| size_of_val(&**ends));
+        size_of_val(&*self.pairs)
+            + size_of_val(&*self.surfaces)
+            + size_of_val(&*self.rounds)
+            + ends.sum::<usize>()
     }
 }
 

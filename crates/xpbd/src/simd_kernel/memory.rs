@@ -36,6 +36,32 @@ impl<R: Float> Buffers<R> {
         &self.0.as_flattened()[k * numbers..(k + 1) * numbers]
     }
 
+    /// Sets the numbers of a corner in a lane.
+    #[inline(always)]
+    pub(crate) fn set<S: Simd>(&mut self, k: usize, lane: usize, values: [R; 4]) {
+        let lanes = R::Lanes::<S>::LEN;
+        self.0[k * lanes + R::row(lane, lanes)] = values;
+    }
+
+    /// The numbers of a corner in a lane.
+    #[inline(always)]
+    pub(crate) fn get<S: Simd>(&self, k: usize, lane: usize) -> [R; 4] {
+        let lanes = R::Lanes::<S>::LEN;
+        self.0[k * lanes + R::row(lane, lanes)]
+    }
+
+    /// The numbers of a corner, each as a vector of all lanes.
+    #[inline(always)]
+    pub(crate) fn columns<S: Simd>(&self, simd: S, k: usize) -> [R::Lanes<S>; 4] {
+        R::columns(simd, load_rows::<R, S>(simd, self.corner::<S>(k)))
+    }
+
+    /// The inverse of [`Self::columns`].
+    #[inline(always)]
+    pub(crate) fn put<S: Simd>(&mut self, simd: S, k: usize, columns: [R::Lanes<S>; 4]) {
+        store_rows::<R, S>(R::rows(simd, columns), self.corner_mut::<S>(k));
+    }
+
     #[inline(always)]
     fn corner_mut<S: Simd>(&mut self, k: usize) -> &mut [R] {
         let numbers = 4 * R::Lanes::<S>::LEN;
@@ -44,7 +70,7 @@ impl<R: Float> Buffers<R> {
 }
 
 #[inline(always)]
-pub(super) fn splat<R: Float, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
+pub(crate) fn splat<R: Float, S: Simd>(simd: S, value: R) -> R::Lanes<S> {
     R::Lanes::<S>::simd_from(simd, value)
 }
 
@@ -177,20 +203,20 @@ pub(crate) fn write_lanes<R: Float, S: Simd>(
 #[inline(always)]
 pub(super) fn gathered<R: Float, S: Simd>(simd: S, buffers: &Buffers<R>) -> [[R::Lanes<S>; 4]; 4] {
     [
-        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(0))),
-        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(1))),
-        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(2))),
-        R::columns(simd, load_rows::<R, S>(simd, buffers.corner::<S>(3))),
+        buffers.columns(simd, 0),
+        buffers.columns(simd, 1),
+        buffers.columns(simd, 2),
+        buffers.columns(simd, 3),
     ]
 }
 
 /// Puts corners into the buffers.
 #[inline(always)]
 pub(super) fn put<R: Float, S: Simd>(simd: S, x: &[[R::Lanes<S>; 4]; 4], buffers: &mut Buffers<R>) {
-    store_rows::<R, S>(R::rows(simd, x[0]), buffers.corner_mut::<S>(0));
-    store_rows::<R, S>(R::rows(simd, x[1]), buffers.corner_mut::<S>(1));
-    store_rows::<R, S>(R::rows(simd, x[2]), buffers.corner_mut::<S>(2));
-    store_rows::<R, S>(R::rows(simd, x[3]), buffers.corner_mut::<S>(3));
+    buffers.put(simd, 0, x[0]);
+    buffers.put(simd, 1, x[1]);
+    buffers.put(simd, 2, x[2]);
+    buffers.put(simd, 3, x[3]);
 }
 
 /// Moves the corners in the buffers, which for that do not have to stay in registers.

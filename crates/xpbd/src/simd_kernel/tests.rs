@@ -258,7 +258,7 @@ impl<R: Float> Case<R> {
 }
 
 /// All instruction sets of this processor that the kernel is compiled for.
-fn levels() -> Vec<Level> {
+pub(crate) fn levels() -> Vec<Level> {
     #[cfg(target_arch = "x86_64")]
     {
         let best = Level::new();

@@ -352,9 +352,8 @@ impl<R: Float> Solver<R> {
 
     /// Replaces all contacts: `pairs` of particles that were one before a cut, and those between `surfaces`, of vertices with
     /// triangles and of edges with edges.
-    /// Each list comes with a color for each of its contacts; contacts of one color share no particle, except for colors
-    /// from 16 on, which one thread solves together. They are solved after all other constraints but the colliders,
-    /// pairs before surfaces; [`StepSettings::relaxation`](crate::StepSettings) does not scale them. Only
+    /// Each list comes with a color for each of its contacts; contacts of one color share no particle. Colors from 16 on are
+    /// solved by one thread. Contacts are solved after all other constraints but the colliders, pairs before surfaces; [`StepSettings::relaxation`](crate::StepSettings) does not scale them. Only
     /// [`Method::GaussSeidel`](crate::Method) solves contacts: a step by another method is an error from now on, until
     /// [`Solver::clear_contacts`].
     ///

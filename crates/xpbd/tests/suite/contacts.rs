@@ -1018,6 +1018,11 @@ fn bad_contacts_and_foreign_colors_are_refused() {
     let touching = [good, face([4, 3, 1, 2])];
     for (faces, colors, message) in [
         (&touching[..], zeros(2), "share particle 3"),
+        (
+            &touching[..],
+            Coloring::new(vec![ColorId(20); 2]),
+            "share particle 3",
+        ),
         (&touching[..1], zeros(2), "found 2"),
         (&[face([0, 1, 2, 5])][..], zeros(1), "particle 5"),
         (&[face([0, 1, 2, 0])][..], zeros(1), "particle 0 twice"),
