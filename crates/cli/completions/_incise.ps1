@@ -48,7 +48,7 @@ Register-ArgumentCompleter -Native -CommandName 'incise' -ScriptBlock {
             [CompletionResult]::new('--animation', '--animation', [CompletionResultType]::ParameterName, 'Write an animation: .gif, or .png for an animated PNG')
             [CompletionResult]::new('--fps', '--fps', [CompletionResultType]::ParameterName, 'Images of the animation for each second, shown at this rate [default: about 25]')
             [CompletionResult]::new('--size', '--size', [CompletionResultType]::ParameterName, 'Width and height of images in pixels [default: 640x480]')
-            [CompletionResult]::new('--view', '--view', [CompletionResultType]::ParameterName, 'Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image [default: -60,22,1]')
+            [CompletionResult]::new('--view', '--view', [CompletionResultType]::ParameterName, 'Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image at the start [default: -60,22,1, and the camera steps back where bodies would leave the image]')
             [CompletionResult]::new('--color-by', '--color-by', [CompletionResultType]::ParameterName, 'Quantity that colors show in images: tissue, color, cluster, piece, stretch or residual. With residual every frame reports it')
             [CompletionResult]::new('--no-pictures', '--no-pictures', [CompletionResultType]::ParameterName, 'Write no images and no contact sheet')
             [CompletionResult]::new('--wireframe', '--wireframe', [CompletionResultType]::ParameterName, 'Draw the edges of triangles')

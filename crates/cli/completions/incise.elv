@@ -44,7 +44,7 @@ set edit:completion:arg-completer[incise] = {|@words|
             cand --animation 'Write an animation: .gif, or .png for an animated PNG'
             cand --fps 'Images of the animation for each second, shown at this rate [default: about 25]'
             cand --size 'Width and height of images in pixels [default: 640x480]'
-            cand --view 'Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image [default: -60,22,1]'
+            cand --view 'Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image at the start [default: -60,22,1, and the camera steps back where bodies would leave the image]'
             cand --color-by 'Quantity that colors show in images: tissue, color, cluster, piece, stretch or residual. With residual every frame reports it'
             cand --no-pictures 'Write no images and no contact sheet'
             cand --wireframe 'Draw the edges of triangles'

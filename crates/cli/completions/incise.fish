@@ -49,7 +49,7 @@ complete -c incise -n "__fish_incise_using_subcommand run" -l save-mesh -d 'Writ
 complete -c incise -n "__fish_incise_using_subcommand run" -l animation -d 'Write an animation: .gif, or .png for an animated PNG' -r -F
 complete -c incise -n "__fish_incise_using_subcommand run" -l fps -d 'Images of the animation for each second, shown at this rate [default: about 25]' -r
 complete -c incise -n "__fish_incise_using_subcommand run" -l size -d 'Width and height of images in pixels [default: 640x480]' -r
-complete -c incise -n "__fish_incise_using_subcommand run" -l view -d 'Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image [default: -60,22,1]' -r
+complete -c incise -n "__fish_incise_using_subcommand run" -l view -d 'Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image at the start [default: -60,22,1, and the camera steps back where bodies would leave the image]' -r
 complete -c incise -n "__fish_incise_using_subcommand run" -l color-by -d 'Quantity that colors show in images: tissue, color, cluster, piece, stretch or residual. With residual every frame reports it' -r
 complete -c incise -n "__fish_incise_using_subcommand run" -l no-pictures -d 'Write no images and no contact sheet'
 complete -c incise -n "__fish_incise_using_subcommand run" -l wireframe -d 'Draw the edges of triangles'

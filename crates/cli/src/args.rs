@@ -119,7 +119,8 @@ pub(crate) struct RunArguments {
     /// Width and height of images in pixels [default: 640x480].
     #[arg(long, value_name = "WxH", value_parser = size)]
     pub(crate) size: Option<[u32; 2]>,
-    /// Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image [default: -60,22,1].
+    /// Camera: azimuth and elevation in degrees, and zoom; at zoom 1 the bodies fit the image at the start [default:
+    /// -60,22,1, and the camera steps back where bodies would leave the image].
     #[arg(long, value_name = "AZIMUTH,ELEVATION[,ZOOM]", value_parser = view, allow_hyphen_values = true)]
     pub(crate) view: Option<[f64; 3]>,
     /// Quantity that colors show in images: tissue, color, cluster, piece, stretch or residual. With residual every frame

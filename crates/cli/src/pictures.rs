@@ -2,9 +2,13 @@
 //!
 //! An animation has about 25 images for each second of simulated time, or the number of `--fps`, independent of the frames
 //! that are saved. It shows the simulated time as it is: an image stands for the first frame at or after its time.
+//!
+//! Without `--view` the camera steps back where bodies would leave the image, and stays there. A few pieces that fly off may
+//! leave it.
 
 use std::path::{Path, PathBuf};
 
+use incise::mesh::glam::DVec3;
 use incise::scene::StrokeSpec;
 use incise::{Scene, Simulation};
 use incise_render::{
@@ -28,6 +32,12 @@ const COLUMNS: usize = 4;
 const SHEET_WIDTH: u32 = 360;
 /// Part of the particles outside of the image from which bodies have left it.
 const LEFT: f64 = 0.1;
+/// Part of the particles outside of the image from which the camera steps back.
+const FEW: f64 = 0.01;
+/// How near to the side of the image, in half images, particles are when it has.
+const CLOSEST: f64 = 0.9;
+/// The camera steps back until the box that it shows is this many times as large as at the start.
+const FARTHEST: f64 = 6.0;
 /// Smallest zoom at which a body is still more than a dot.
 const SMALLEST_ZOOM: f64 = 0.05;
 /// A ground deeper below the bodies than this many of their diagonals is not included in the view.
@@ -42,6 +52,11 @@ pub(crate) struct Pictures {
     camera: Camera,
     /// Azimuth and elevation in degrees, and zoom.
     view: [f64; 3],
+    /// The box that the camera shows, and its diagonal at the start.
+    shown: [DVec3; 2],
+    diagonal: f64,
+    /// Whether the camera steps back.
+    follows: bool,
     style: Style,
     size: [u32; 2],
     strokes: Vec<StrokeSpec>,
@@ -87,18 +102,24 @@ impl Pictures {
             Some(rate) => 1.0 / rate,
             None => animation_every(time_step) as f64 * time_step,
         };
+        let view = arguments.view.unwrap_or(VIEW);
+        let size = arguments.size.unwrap_or(SIZE);
+        let shown = with_ground(scene, render_scene.bounds(simulation));
         Ok(Some(Self {
             renderer,
             note,
-            camera: camera(arguments, scene, render_scene.bounds(simulation)),
-            view: arguments.view.unwrap_or(VIEW),
+            camera: camera(shown, view, size),
+            view,
+            shown,
+            diagonal: shown[0].distance(shown[1]),
+            follows: arguments.view.is_none(),
             render_scene,
             style: Style {
                 color_by: arguments.color_by,
                 wireframe: arguments.wireframe,
                 ..Style::default()
             },
-            size: arguments.size.unwrap_or(SIZE),
+            size,
             strokes: scene.stroke.clone(),
             saved: !arguments.no_pictures,
             animation: arguments.animation.clone(),
@@ -174,6 +195,9 @@ impl Pictures {
         {
             simulation.read_back()?;
         }
+        if self.follows {
+            self.step_back(simulation.positions());
+        }
         let frame = simulation.report().frame;
         self.render_scene.set_blade(None);
         for blade in self
@@ -193,22 +217,50 @@ impl Pictures {
             .picture(render_scene, simulation, camera, &self.style, self.size)
     }
 
-    /// Notes whether bodies have left the picture.
-    fn note_view(&mut self, simulation: &Simulation) {
+    /// How far a point is from the middle of the image, in half images; more than 1 outside.
+    fn across(&self, x: DVec3) -> f64 {
         let size = self.size.map(f64::from);
-        let positions = simulation.positions();
-        let mut outside = 0;
-        for &x in positions {
-            let pixel = self.camera.project(x, size);
-            let across = pixel.map(|p| {
-                (2.0 * p.x / size[0] - 1.0)
-                    .abs()
-                    .max((2.0 * p.y / size[1] - 1.0).abs())
-            });
-            outside += usize::from(across.is_none_or(|across| across > 1.0));
-            self.widest = self.widest.max(across.unwrap_or(f64::INFINITY));
+        let pixel = self.camera.project(x, size);
+        pixel.map_or(f64::INFINITY, |p| {
+            let [right, down] = [p.x / size[0], p.y / size[1]].map(|part| (2.0 * part - 1.0).abs());
+            right.max(down)
+        })
+    }
+
+    /// Whether more than a part of the particles is outside of the image.
+    fn have_left(&self, positions: &[DVec3], part: f64) -> bool {
+        let outside = positions.iter().filter(|x| self.across(**x) > 1.0).count();
+        outside as f64 > part * positions.len() as f64
+    }
+
+    /// Moves the camera away where particles are outside of the image, so that it shows all but a few of them.
+    fn step_back(&mut self, positions: &[DVec3]) {
+        if !self.have_left(positions, FEW) {
+            return;
         }
-        if outside as f64 > LEFT * positions.len() as f64 {
+        let [low, high] = middle_of(positions, FEW / 2.0);
+        let [shown_low, shown_high] = self.shown;
+        let shown = [low.min(shown_low), high.max(shown_high)];
+        // What falls forever would become a dot.
+        if shown[0].distance(shown[1]) <= FARTHEST * self.diagonal {
+            self.shown = shown;
+            self.camera = camera(shown, self.view, self.size);
+            // The corners of the box may be empty. What is near the eye moves out faster than the rest.
+            for _ in 0..4 {
+                let mut across: Vec<f64> = positions.iter().map(|x| self.across(*x)).collect();
+                across.sort_unstable_by(f64::total_cmp);
+                let widest = across[part_of(1.0 - FEW / 2.0, across.len())];
+                self.camera.zoom(widest / CLOSEST);
+            }
+        }
+    }
+
+    /// Notes whether bodies have left the image.
+    fn note_view(&mut self, simulation: &Simulation) {
+        let positions = simulation.positions();
+        let distances = positions.iter().map(|x| self.across(*x));
+        self.widest = distances.fold(self.widest, f64::max);
+        if self.have_left(positions, LEFT) {
             self.left.get_or_insert(simulation.report().frame);
         }
     }
@@ -253,21 +305,44 @@ impl Pictures {
     }
 }
 
-/// A camera that shows the bodies and, if it is near, the ground below them.
-fn camera(
-    arguments: &RunArguments,
-    scene: &Scene,
-    [mut low, high]: [incise::mesh::glam::DVec3; 2],
-) -> Camera {
+/// A box around the bodies and, if it is near, the ground below them.
+fn with_ground(scene: &Scene, [mut low, high]: [DVec3; 2]) -> [DVec3; 2] {
     let deepest = low.z - DEEPEST * (high - low).length();
     if let Some(ground) = scene.world.ground.filter(|ground| ground.height > deepest) {
         low.z = low.z.min(ground.height);
     }
+    [low, high]
+}
+
+/// The number of the first of `count` sorted things beyond a part of them.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a part of a count"
+)]
+fn part_of(part: f64, count: usize) -> usize {
+    (part * (count - 1) as f64) as usize
+}
+
+/// A box around all points but a part of them at either side of each axis.
+fn middle_of(points: &[DVec3], part: f64) -> [DVec3; 2] {
+    let out = part_of(part, points.len());
+    let mut bounds = [DVec3::ZERO; 2];
+    for axis in 0..3 {
+        let mut along: Vec<f64> = points.iter().map(|x| x[axis]).collect();
+        along.sort_unstable_by(f64::total_cmp);
+        bounds[0][axis] = along[out];
+        bounds[1][axis] = along[along.len() - 1 - out];
+    }
+    bounds
+}
+
+/// A camera that shows a box.
+fn camera([low, high]: [DVec3; 2], [azimuth, elevation, zoom]: [f64; 3], size: [u32; 2]) -> Camera {
     let mut camera = Camera::fit(low, high);
-    let [azimuth, elevation, zoom] = arguments.view.unwrap_or(VIEW);
     camera.azimuth = azimuth.to_radians();
     camera.elevation = elevation.to_radians();
-    let [width, height] = arguments.size.unwrap_or(SIZE).map(f64::from);
+    let [width, height] = size.map(f64::from);
     // Wide images keep room at the sides for pieces that fall off.
     camera.fit_distance(low, high, (width / height).min(1.0));
     camera.zoom(1.0 / zoom);

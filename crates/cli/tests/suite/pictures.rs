@@ -47,12 +47,12 @@ fn a_run_is_seen() {
     assert_ne!(read(&frames[0]), read(&frames[3]), "it falls");
 }
 
-/// A body that falls out of the picture is named, and the view of the message shows it.
+/// A body that falls out of a view that was asked for is named, and the view of the message shows it.
 #[test]
 fn a_body_that_leaves_the_picture_is_named() {
     let sandbox = Sandbox::with_scene();
     let frames = ["--frames", "40", "--size", "48x32"];
-    let said = run(&sandbox, &frames);
+    let said = run(&sandbox, &[&frames[..], &["--view=-60,22,1"]].concat());
     let note = said
         .lines()
         .find(|line| line.starts_with("bodies leave the picture at frame "));
@@ -63,6 +63,26 @@ fn a_body_that_leaves_the_picture_is_named() {
     let view = view.unwrap_or_else(|| panic!("{note}"));
     let said = run(&sandbox, &[&frames[..], &[view]].concat());
     assert!(!said.contains("leave the picture"), "{said}");
+}
+
+/// Without a view the camera steps back when a body moves away. It starts from the same picture as the default view.
+#[test]
+fn the_camera_steps_back() {
+    let sandbox = Sandbox::new();
+    let body = "shape = { kind = \"box\", tets = 200 }\nscale = 0.3\nvelocity = [3.0, 0.0, 0.0]\n";
+    sandbox.write("scene.toml", format!("[[body]]\n{body}"));
+    let frames = ["--frames", "30", "--size", "48x32"];
+    let said = run(&sandbox, &frames);
+    assert!(!said.contains("leave the picture"), "{said}");
+    let read = |frame: u32| {
+        let path = sandbox.path("out").join(format!("frame_{frame:05}.png"));
+        fs::read(path).unwrap()
+    };
+    let [first, last] = [0, 29].map(read);
+    let said = run(&sandbox, &[&frames[..], &["--view=-60,22,1"]].concat());
+    assert!(said.contains("leave the picture"), "{said}");
+    assert_eq!(read(0), first);
+    assert_ne!(read(29), last);
 }
 
 #[test]
