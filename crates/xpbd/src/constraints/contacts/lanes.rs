@@ -8,7 +8,7 @@
 //! is left to that function: a contact that has pressed along another plane in the iteration before, and blocks of one or
 //! two contacts.
 //!
-//! Cost: reading and transposing four particles a contact, then the operations of one contact for all lanes together.
+//! Cost: four particles of each contact are read and transposed, then all lanes together take the operations of one contact.
 
 use std::ops::Range;
 
@@ -61,28 +61,34 @@ struct Places<R: Float, S: Simd> {
     before: [Quad<R, S>; 4],
 }
 
-/// A kind of contacts.
-trait Kind<R: Float> {
-    type Contact;
+/// What a lane reads of a contact.
+trait LaneContact<R: Float> {
     /// Particles of a contact.
     const PARTICLES: usize;
 
     /// The particles; of a pair the first two.
-    fn particles(contact: &Self::Contact) -> [u32; 4];
+    fn particles(&self) -> [u32; 4];
     /// The normal or the one beyond, and the thickness.
-    fn direction(contact: &Self::Contact) -> [R; 4];
+    fn direction(&self) -> [R; 4];
     /// The limit and its distance.
-    fn limit(contact: &Self::Contact) -> [R; 4];
+    fn limit(&self) -> [R; 4];
     /// [`Contacts::solve_one`].
     fn solve_one(
+        &self,
         contacts: &Contacts<R>,
         index: usize,
-        contact: &Self::Contact,
         particles: &Particles<R>,
         factors: ContactFactors<R>,
     );
+}
+
+/// A kind of contacts.
+trait Kind<R: Float> {
+    type Contact: LaneContact<R>;
+
+    /// The own planes; `direction` has [`LaneContact::direction`].
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S>;
-    /// What acts where the contacts in `due` may; `limits` reads the limits.
+    /// What acts. `limits` reads [`LaneContact::limit`].
     fn gaps<S: Simd>(
         simd: S,
         own: &OwnPlanes<R, S>,
@@ -194,7 +200,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
         let count = block.len();
         if count < FEWEST {
             for (lane, contact) in block.iter().enumerate() {
-                K::solve_one(contacts, first + lane, contact, particles, self.factors);
+                contact.solve_one(contacts, first + lane, particles, self.factors);
             }
             return count;
         }
@@ -205,16 +211,16 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
         let mut numbers = [[0; 4]; MOST_LANES];
         for (lane, numbers) in numbers[..lanes].iter_mut().enumerate() {
             let contact = &block[of_lane(lane)];
-            *numbers = K::particles(contact);
-            for (k, &p) in numbers[..K::PARTICLES].iter().enumerate() {
+            *numbers = contact.particles();
+            for (k, &p) in numbers[..K::Contact::PARTICLES].iter().enumerate() {
                 self.x
                     .set::<S>(k, lane, R::read(&particles.cells[p as usize]));
             }
             self.constants
-                .set::<S>(DIRECTION, lane, K::direction(contact));
+                .set::<S>(DIRECTION, lane, contact.direction());
         }
         let mut now = [[zero; 4]; 4];
-        for (k, now) in now[..K::PARTICLES].iter_mut().enumerate() {
+        for (k, now) in now[..K::Contact::PARTICLES].iter_mut().enumerate() {
             *now = self.x.columns(simd, k);
         }
         let direction = self.constants.columns(simd, DIRECTION);
@@ -244,7 +250,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
         }
 
         for (lane, numbers) in numbers[..lanes].iter().enumerate() {
-            for (k, &p) in numbers[..K::PARTICLES].iter().enumerate() {
+            for (k, &p) in numbers[..K::Contact::PARTICLES].iter().enumerate() {
                 let [x, y, z] = R::components(particles.previous[p as usize]);
                 self.previous.set::<S>(k, lane, [x, y, z, R::ZERO]);
             }
@@ -253,14 +259,17 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
             now,
             before: [[zero; 4]; 4],
         };
-        for (k, before) in places.before[..K::PARTICLES].iter_mut().enumerate() {
+        for (k, before) in places.before[..K::Contact::PARTICLES]
+            .iter_mut()
+            .enumerate()
+        {
             *before = self.previous.columns(simd, k);
         }
         let kept = self.splat(self.factors.kept);
         let constants = &mut self.constants;
         let limits = || {
             for lane in 0..lanes {
-                let limit = K::limit(&block[of_lane(lane)]);
+                let limit = block[of_lane(lane)].limit();
                 constants.set::<S>(LIMIT, lane, limit);
             }
             constants.columns(simd, LIMIT)
@@ -277,8 +286,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
             while left != 0 {
                 let lane = left.trailing_zeros() as usize;
                 left &= left - 1;
-                let (index, contact) = (first + lane, &block[lane]);
-                K::solve_one(contacts, index, contact, particles, self.factors);
+                block[lane].solve_one(contacts, first + lane, particles, self.factors);
             }
         }
         if !active.any_true() {
@@ -287,7 +295,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
 
         let Planes { normal, shares, .. } = gaps.planes;
         let (mut sum, mut most) = (zero, zero);
-        for (place, &share) in places.now[..K::PARTICLES].iter().zip(&shares) {
+        for (place, &share) in places.now[..K::Contact::PARTICLES].iter().zip(&shares) {
             let weight = place[3];
             sum += weight * share * share;
             let moved = weight * absolute::<R, S>(simd, share);
@@ -303,7 +311,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
         if self.factors.friction > R::ZERO {
             let mut slide = [zero; 3];
             let ways = places.now.iter().zip(&places.before).zip(&shares);
-            for ((now, before), &share) in ways.take(K::PARTICLES) {
+            for ((now, before), &share) in ways.take(K::Contact::PARTICLES) {
                 let [x, y, z] = between::<R, S>(now, before);
                 slide[0] += x * share;
                 slide[1] += y * share;
@@ -329,7 +337,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
         let [ix, iy, iz] = impulse;
         active &= ix.is_finite() & iy.is_finite() & iz.is_finite();
         let moves = places.now.iter().zip(&shares).enumerate();
-        for (k, (&[x, y, z, weight], &share)) in moves.take(K::PARTICLES) {
+        for (k, (&[x, y, z, weight], &share)) in moves.take(K::Contact::PARTICLES) {
             let part = weight * share;
             let moved = [x + ix * part, y + iy * part, z + iz * part, weight];
             self.x.put(simd, k, moved);
@@ -348,7 +356,7 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
         while left != 0 {
             let lane = left.trailing_zeros() as usize;
             left &= left - 1;
-            let numbers = &numbers[lane][..K::PARTICLES];
+            let numbers = &numbers[lane][..K::Contact::PARTICLES];
             for (k, &p) in numbers.iter().enumerate() {
                 R::write(&particles.cells[p as usize], self.x.get::<S>(k, lane));
             }
@@ -371,44 +379,79 @@ impl<R: Float, S: Simd> InLanes<'_, R, S> {
     }
 }
 
-/// [`Pair`] in lanes.
+/// [`Pair`].
 struct Pairs;
-/// [`Surface`] between a vertex and a triangle in lanes.
+/// [`Surface`] of a vertex and a triangle.
 struct Faces;
-/// [`Surface`] between edges in lanes.
+/// [`Surface`] of two edges.
 struct Edges;
 
-impl<R: Float> Kind<R> for Pairs {
-    type Contact = Pair<R>;
+impl<R: Float> LaneContact<R> for Pair<R> {
     const PARTICLES: usize = 2;
 
     #[inline(always)]
-    fn particles(contact: &Pair<R>) -> [u32; 4] {
-        let [a, b] = contact.particles;
+    fn particles(&self) -> [u32; 4] {
+        let [a, b] = self.particles;
         [a, b, 0, 0]
     }
 
     #[inline(always)]
-    fn direction(contact: &Pair<R>) -> [R; 4] {
-        let [x, y, z] = R::components(contact.normal);
+    fn direction(&self) -> [R; 4] {
+        let [x, y, z] = R::components(self.normal);
         [x, y, z, R::ZERO]
     }
 
     #[inline(always)]
-    fn limit(_: &Pair<R>) -> [R; 4] {
+    fn limit(&self) -> [R; 4] {
         [R::ZERO; 4]
     }
 
     #[inline(never)]
     fn solve_one(
+        &self,
         contacts: &Contacts<R>,
         index: usize,
-        contact: &Pair<R>,
         particles: &Particles<R>,
         factors: ContactFactors<R>,
     ) {
-        contacts.solve_one(index, contact, particles, factors);
+        contacts.solve_one(index, self, particles, factors);
     }
+}
+
+impl<R: Float> LaneContact<R> for Surface<R> {
+    const PARTICLES: usize = 4;
+
+    #[inline(always)]
+    fn particles(&self) -> [u32; 4] {
+        self.particles
+    }
+
+    #[inline(always)]
+    fn direction(&self) -> [R; 4] {
+        let [x, y, z] = self.beyond;
+        [x, y, z, self.thickness]
+    }
+
+    #[inline(always)]
+    fn limit(&self) -> [R; 4] {
+        let [x, y, z] = self.limit;
+        [x, y, z, self.distance]
+    }
+
+    #[inline(never)]
+    fn solve_one(
+        &self,
+        contacts: &Contacts<R>,
+        index: usize,
+        particles: &Particles<R>,
+        factors: ContactFactors<R>,
+    ) {
+        contacts.solve_one(index, self, particles, factors);
+    }
+}
+
+impl<R: Float> Kind<R> for Pairs {
+    type Contact = Pair<R>;
 
     #[inline(always)]
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S> {
@@ -448,35 +491,6 @@ impl<R: Float> Kind<R> for Pairs {
 
 impl<R: Float> Kind<R> for Faces {
     type Contact = Surface<R>;
-    const PARTICLES: usize = 4;
-
-    #[inline(always)]
-    fn particles(contact: &Surface<R>) -> [u32; 4] {
-        contact.particles
-    }
-
-    #[inline(always)]
-    fn direction(contact: &Surface<R>) -> [R; 4] {
-        let [x, y, z] = contact.beyond;
-        [x, y, z, contact.thickness]
-    }
-
-    #[inline(always)]
-    fn limit(contact: &Surface<R>) -> [R; 4] {
-        let [x, y, z] = contact.limit;
-        [x, y, z, contact.distance]
-    }
-
-    #[inline(never)]
-    fn solve_one(
-        contacts: &Contacts<R>,
-        index: usize,
-        contact: &Surface<R>,
-        particles: &Particles<R>,
-        factors: ContactFactors<R>,
-    ) {
-        contacts.solve_one(index, contact, particles, factors);
-    }
 
     #[inline(always)]
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S> {
@@ -574,34 +588,6 @@ impl<R: Float> Kind<R> for Faces {
 
 impl<R: Float> Kind<R> for Edges {
     type Contact = Surface<R>;
-    const PARTICLES: usize = 4;
-
-    #[inline(always)]
-    fn particles(contact: &Surface<R>) -> [u32; 4] {
-        contact.particles
-    }
-
-    #[inline(always)]
-    fn direction(contact: &Surface<R>) -> [R; 4] {
-        let [x, y, z] = contact.beyond;
-        [x, y, z, contact.thickness]
-    }
-
-    #[inline(always)]
-    fn limit(_: &Surface<R>) -> [R; 4] {
-        [R::ZERO; 4]
-    }
-
-    #[inline(always)]
-    fn solve_one(
-        contacts: &Contacts<R>,
-        index: usize,
-        contact: &Surface<R>,
-        particles: &Particles<R>,
-        factors: ContactFactors<R>,
-    ) {
-        Faces::solve_one(contacts, index, contact, particles, factors);
-    }
 
     #[inline(always)]
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S> {
