@@ -37,7 +37,7 @@ const FEW: f64 = 0.01;
 /// How near to the side of the image, in half images, particles are when it has.
 const CLOSEST: f64 = 0.9;
 /// The camera steps back until the box that it shows is this many times as large as at the start.
-const FARTHEST: f64 = 6.0;
+const FARTHEST: f64 = 4.0;
 /// Smallest zoom at which a body is still more than a dot.
 const SMALLEST_ZOOM: f64 = 0.05;
 /// A ground deeper below the bodies than this many of their diagonals is not included in the view.
@@ -245,12 +245,15 @@ impl Pictures {
         if shown[0].distance(shown[1]) <= FARTHEST * self.diagonal {
             self.shown = shown;
             self.camera = camera(shown, self.view, self.size);
+            let farthest = self.camera.distance;
             // The corners of the box may be empty. What is near the eye moves out faster than the rest.
             for _ in 0..4 {
                 let mut across: Vec<f64> = positions.iter().map(|x| self.across(*x)).collect();
                 across.sort_unstable_by(f64::total_cmp);
                 let widest = across[part_of(1.0 - FEW / 2.0, across.len())];
                 self.camera.zoom(widest / CLOSEST);
+                // Far from the box there may be something, too.
+                self.camera.distance = self.camera.distance.min(farthest);
             }
         }
     }
