@@ -238,7 +238,7 @@ impl Pictures {
         if !self.have_left(positions, FEW) {
             return;
         }
-        let [low, high] = middle_of(positions, FEW / 2.0);
+        let [low, high] = middle_of(positions, FEW / 8.0);
         let [shown_low, shown_high] = self.shown;
         let shown = [low.min(shown_low), high.max(shown_high)];
         // What falls forever would become a dot.
@@ -250,7 +250,7 @@ impl Pictures {
             for _ in 0..4 {
                 let mut across: Vec<f64> = positions.iter().map(|x| self.across(*x)).collect();
                 across.sort_unstable_by(f64::total_cmp);
-                let widest = across[part_of(1.0 - FEW / 2.0, across.len())];
+                let widest = across[part_of(1.0 - FEW / 8.0, across.len())];
                 self.camera.zoom(widest / CLOSEST);
                 // Far from the box there may be something, too.
                 self.camera.distance = self.camera.distance.min(farthest);
