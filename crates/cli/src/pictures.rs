@@ -3,8 +3,8 @@
 //! An animation has about 25 images for each second of simulated time, or the number of `--fps`, independent of the frames
 //! that are saved. It shows the simulated time as it is: an image stands for the first frame at or after its time.
 //!
-//! Without `--view` the camera steps back where bodies would leave the image, and stays there. A few pieces that fly off may
-//! leave it.
+//! Without `--view` the camera steps back where bodies would leave the image. What falls far away is given up: the camera
+//! returns to the rest.
 
 use std::path::{Path, PathBuf};
 
@@ -36,8 +36,8 @@ const LEFT: f64 = 0.1;
 const FEW: f64 = 0.01;
 /// How near to the side of the image, in half images, particles are when it has.
 const CLOSEST: f64 = 0.9;
-/// The camera steps back until the box that it shows is this many times as large as at the start.
-const FARTHEST: f64 = 4.0;
+/// What is further from the middle of the start than this many diagonals of the box that the camera shows then is given up.
+const FARTHEST: f64 = 2.0;
 /// Smallest zoom at which a body is still more than a dot.
 const SMALLEST_ZOOM: f64 = 0.05;
 /// A ground deeper below the bodies than this many of their diagonals is not included in the view.
@@ -52,11 +52,13 @@ pub(crate) struct Pictures {
     camera: Camera,
     /// Azimuth and elevation in degrees, and zoom.
     view: [f64; 3],
-    /// The box that the camera shows, and its diagonal at the start.
+    /// The box that the camera shows, at the start and now.
+    start: [DVec3; 2],
     shown: [DVec3; 2],
-    diagonal: f64,
     /// Whether the camera steps back.
     follows: bool,
+    /// The number of particles that were given up.
+    lost: usize,
     style: Style,
     size: [u32; 2],
     strokes: Vec<StrokeSpec>,
@@ -110,9 +112,10 @@ impl Pictures {
             note,
             camera: camera(shown, view, size),
             view,
+            start: shown,
             shown,
-            diagonal: shown[0].distance(shown[1]),
             follows: arguments.view.is_none(),
+            lost: 0,
             render_scene,
             style: Style {
                 color_by: arguments.color_by,
@@ -233,28 +236,35 @@ impl Pictures {
         outside as f64 > part * positions.len() as f64
     }
 
-    /// Moves the camera away where particles are outside of the image, so that it shows all but a few of them.
-    fn step_back(&mut self, positions: &[DVec3]) {
-        if !self.have_left(positions, FEW) {
+    /// Moves the camera away where particles are outside of the image, so that it shows all but a few of those that are not
+    /// given up, and back to the start where more are given up.
+    fn step_back(&mut self, all: &[DVec3]) {
+        let [low, high] = self.start;
+        let (middle, farthest) = ((low + high) / 2.0, FARTHEST * low.distance(high));
+        let near = |x: &DVec3| x.distance(middle) <= farthest;
+        let positions: Vec<DVec3> = all.iter().copied().filter(near).collect();
+        let lost = all.len() - positions.len();
+        if lost > self.lost {
+            self.shown = self.start;
+            self.camera = camera(self.start, self.view, self.size);
+        }
+        self.lost = lost;
+        if !self.have_left(&positions, FEW) {
             return;
         }
-        let [low, high] = middle_of(positions, FEW / 8.0);
+        let [low, high] = middle_of(&positions, FEW / 8.0);
         let [shown_low, shown_high] = self.shown;
-        let shown = [low.min(shown_low), high.max(shown_high)];
-        // What falls forever would become a dot.
-        if shown[0].distance(shown[1]) <= FARTHEST * self.diagonal {
-            self.shown = shown;
-            self.camera = camera(shown, self.view, self.size);
-            let farthest = self.camera.distance;
-            // The corners of the box may be empty. What is near the eye moves out faster than the rest.
-            for _ in 0..4 {
-                let mut across: Vec<f64> = positions.iter().map(|x| self.across(*x)).collect();
-                across.sort_unstable_by(f64::total_cmp);
-                let widest = across[part_of(1.0 - FEW / 8.0, across.len())];
-                self.camera.zoom(widest / CLOSEST);
-                // Far from the box there may be something, too.
-                self.camera.distance = self.camera.distance.min(farthest);
-            }
+        self.shown = [low.min(shown_low), high.max(shown_high)];
+        self.camera = camera(self.shown, self.view, self.size);
+        let farthest = self.camera.distance;
+        // The corners of the box may be empty. What is near the eye moves out faster than the rest.
+        for _ in 0..4 {
+            let mut across: Vec<f64> = positions.iter().map(|x| self.across(*x)).collect();
+            across.sort_unstable_by(f64::total_cmp);
+            let widest = across[part_of(1.0 - FEW / 8.0, across.len())];
+            self.camera.zoom(widest / CLOSEST);
+            // What lies outside of the box does not count.
+            self.camera.distance = self.camera.distance.min(farthest);
         }
     }
 

@@ -65,24 +65,36 @@ fn a_body_that_leaves_the_picture_is_named() {
     assert!(!said.contains("leave the picture"), "{said}");
 }
 
-/// Without a view the camera steps back when a body moves away. It starts from the same picture as the default view.
+/// Without a view the camera steps back when a body moves away, and returns to the start when it is too far.
 #[test]
 fn the_camera_steps_back() {
     let sandbox = Sandbox::new();
-    let body = "shape = { kind = \"box\", tets = 200 }\nscale = 0.3\nvelocity = [3.0, 0.0, 0.0]\n";
-    sandbox.write("scene.toml", format!("[[body]]\n{body}"));
     let frames = ["--frames", "30", "--size", "48x32"];
-    let said = run(&sandbox, &frames);
-    assert!(!said.contains("leave the picture"), "{said}");
-    let read = |frame: u32| {
-        let path = sandbox.path("out").join(format!("frame_{frame:05}.png"));
-        fs::read(path).unwrap()
+    let first_and_last = |options: &[&str], speed: f64| {
+        let body = "[[body]]\nshape = { kind = \"box\", tets = 200 }\nscale = 0.3\n";
+        sandbox.write(
+            "scene.toml",
+            format!("{body}velocity = [{speed:?}, 0.0, 0.0]\n"),
+        );
+        let said = run(&sandbox, &[&frames[..], options].concat());
+        let has_left = said.contains("leave the picture");
+        let read = |frame: u32| {
+            fs::read(sandbox.path("out").join(format!("frame_{frame:05}.png"))).unwrap()
+        };
+        (has_left, [read(0), read(29)])
     };
-    let [first, last] = [0, 29].map(read);
-    let said = run(&sandbox, &[&frames[..], &["--view=-60,22,1"]].concat());
-    assert!(said.contains("leave the picture"), "{said}");
-    assert_eq!(read(0), first);
-    assert_ne!(read(29), last);
+    for (speed, is_followed) in [(1.5, true), (30.0, false)] {
+        let (has_left, [first, last]) = first_and_last(&[], speed);
+        assert_eq!(has_left, !is_followed);
+        let (has_left, fixed) = first_and_last(&["--view=-60,22,1"], speed);
+        assert!(has_left);
+        assert_eq!(
+            fixed[0] == first,
+            is_followed,
+            "fast bodies are far in the first picture"
+        );
+        assert_eq!(fixed[1] == last, !is_followed);
+    }
 }
 
 #[test]
