@@ -88,15 +88,30 @@ trait Kind<R: Float> {
 
     /// The own planes; `direction` has [`LaneContact::direction`].
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S>;
-    /// What acts. `limits` reads [`LaneContact::limit`].
+    /// `C` of planes at positions.
+    fn value<S: Simd>(
+        planes: &Planes<R, S>,
+        x: &[Quad<R, S>; 4],
+        direction: &Quad<R, S>,
+    ) -> Lanes<R, S>;
+    /// What acts: the own planes, unless a kind has others. `_limits` reads [`LaneContact::limit`].
+    #[inline(always)]
     fn gaps<S: Simd>(
         simd: S,
         own: &OwnPlanes<R, S>,
         places: &Places<R, S>,
         direction: &Quad<R, S>,
-        limits: impl FnOnce() -> Quad<R, S>,
+        _limits: impl FnOnce() -> Quad<R, S>,
         kept: Lanes<R, S>,
-    ) -> Gaps<R, S>;
+    ) -> Gaps<R, S> {
+        let before = Self::value(&own.planes, &places.before, direction);
+        Gaps {
+            planes: own.planes,
+            are_second: Mask::<R, S>::splat(simd, false),
+            residual: new_part::<R, S>(simd, own.value, before, kept),
+            are_past: own.are_past,
+        }
+    }
 }
 
 /// Solves contacts of one color, given by their numbers among those of their kind.
@@ -457,35 +472,25 @@ impl<R: Float> Kind<R> for Pairs {
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S> {
         let (zero, one) = (splat::<R, S>(simd, R::ZERO), splat::<R, S>(simd, R::ONE));
         let [a, b, c, _] = *direction;
-        let normal = [a, b, c];
+        let planes = Planes {
+            normal: [a, b, c],
+            shares: [-one, one, zero, zero],
+            exist: Mask::<R, S>::splat(simd, true),
+        };
         OwnPlanes {
-            planes: Planes {
-                normal,
-                shares: [-one, one, zero, zero],
-                exist: Mask::<R, S>::splat(simd, true),
-            },
-            value: dot::<R, S>(&normal, &between::<R, S>(&x[1], &x[0])),
+            value: Self::value(&planes, x, direction),
+            planes,
             are_past: Mask::<R, S>::splat(simd, false),
         }
     }
 
     #[inline(always)]
-    fn gaps<S: Simd>(
-        simd: S,
-        own: &OwnPlanes<R, S>,
-        places: &Places<R, S>,
+    fn value<S: Simd>(
+        planes: &Planes<R, S>,
+        [first, second, ..]: &[Quad<R, S>; 4],
         _: &Quad<R, S>,
-        _: impl FnOnce() -> Quad<R, S>,
-        kept: Lanes<R, S>,
-    ) -> Gaps<R, S> {
-        let [first, second, ..] = &places.before;
-        let before = dot::<R, S>(&own.planes.normal, &between::<R, S>(second, first));
-        Gaps {
-            planes: own.planes,
-            are_second: Mask::<R, S>::splat(simd, false),
-            residual: new_part::<R, S>(simd, own.value, before, kept),
-            are_past: own.are_past,
-        }
+    ) -> Lanes<R, S> {
+        dot::<R, S>(&planes.normal, &between::<R, S>(second, first))
     }
 }
 
@@ -511,6 +516,15 @@ impl<R: Float> Kind<R> for Faces {
             planes,
             are_past: Mask::<R, S>::splat(simd, false),
         }
+    }
+
+    #[inline(always)]
+    fn value<S: Simd>(
+        planes: &Planes<R, S>,
+        x: &[Quad<R, S>; 4],
+        direction: &Quad<R, S>,
+    ) -> Lanes<R, S> {
+        above::<R, S>(planes, &basis::<R, S>(x), direction[3])
     }
 
     #[inline(always)]
@@ -593,7 +607,7 @@ impl<R: Float> Kind<R> for Edges {
     fn own<S: Simd>(simd: S, x: &[Quad<R, S>; 4], direction: &Quad<R, S>) -> OwnPlanes<R, S> {
         let (zero, one) = (splat::<R, S>(simd, R::ZERO), splat::<R, S>(simd, R::ONE));
         let [x0, x1, x2, x3] = x;
-        let [nx, ny, nz, thickness] = *direction;
+        let [nx, ny, nz, _] = *direction;
         let (length, along, have_first) = directions::<R, S>(simd, &between::<R, S>(x1, x0));
         let (other_length, other, have_second) = directions::<R, S>(simd, &between::<R, S>(x3, x2));
         let across = cross::<R, S>(&along, &other);
@@ -618,28 +632,26 @@ impl<R: Float> Kind<R> for Edges {
             exist,
         };
         OwnPlanes {
-            value: apart::<R, S>(&planes, x, thickness),
+            value: Self::value(&planes, x, direction),
             planes,
             are_past: !on_edges,
         }
     }
 
     #[inline(always)]
-    fn gaps<S: Simd>(
-        simd: S,
-        own: &OwnPlanes<R, S>,
-        places: &Places<R, S>,
+    fn value<S: Simd>(
+        planes: &Planes<R, S>,
+        [x0, x1, x2, x3]: &[Quad<R, S>; 4],
         direction: &Quad<R, S>,
-        _: impl FnOnce() -> Quad<R, S>,
-        kept: Lanes<R, S>,
-    ) -> Gaps<R, S> {
-        let before = apart::<R, S>(&own.planes, &places.before, direction[3]);
-        Gaps {
-            planes: own.planes,
-            are_second: Mask::<R, S>::splat(simd, false),
-            residual: new_part::<R, S>(simd, own.value, before, kept),
-            are_past: own.are_past,
+    ) -> Lanes<R, S> {
+        let [_, first, _, second] = planes.shares;
+        let mut way = planes.normal;
+        for axis in 0..3 {
+            way[axis] = (x0[axis] - x2[axis])
+                + (x1[axis] - x0[axis]) * first
+                + (x3[axis] - x2[axis]) * second;
         }
+        dot::<R, S>(&planes.normal, &way) - direction[3]
     }
 }
 
@@ -752,22 +764,6 @@ fn above<R: Float, S: Simd>(
     let mut way = *r;
     for axis in 0..3 {
         way[axis] = r[axis] + e1[axis] * second + e2[axis] * third;
-    }
-    dot::<R, S>(&planes.normal, &way) - thickness
-}
-
-/// The distance of edges along their normal, less the thickness.
-#[inline(always)]
-fn apart<R: Float, S: Simd>(
-    planes: &Planes<R, S>,
-    [x0, x1, x2, x3]: &[Quad<R, S>; 4],
-    thickness: Lanes<R, S>,
-) -> Lanes<R, S> {
-    let [_, first, _, second] = planes.shares;
-    let mut way = planes.normal;
-    for axis in 0..3 {
-        way[axis] =
-            (x0[axis] - x2[axis]) + (x1[axis] - x0[axis]) * first + (x3[axis] - x2[axis]) * second;
     }
     dot::<R, S>(&planes.normal, &way) - thickness
 }
