@@ -65,6 +65,9 @@ enum Seen {
     Both,
 }
 
+/// Part of a tet's size below which the distance of a particle from a tangent plane is rounding.
+const IN_SURFACE: f64 = 1e-9;
+
 /// The particles along the surface of a stroke. The map is never iterated.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -272,10 +275,15 @@ impl CutSurface {
             let tangents = marks.iter().filter_map(|mark| mark.tangent);
             tangents.map(|t| t.distance(rest[p.index()])).sum::<f64>()
         };
-        let leans: f64 = if off().next().is_some() {
-            off().map(|(_, p)| leaning(p)).sum()
+        let all = || corners.into_iter().map(leaning).sum::<f64>();
+        let off_it: f64 = off().map(|(_, p)| leaning(p)).sum();
+        let [a, b, c, d] = corners.map(|p| rest[p.index()]);
+        let size = (b - a).length().max((c - a).length()).max((d - a).length());
+        // Particles can lie in the surface and not be known to: then only the whole tet says more than rounding does.
+        let leans = if off_it.abs() > IN_SURFACE * size {
+            off_it
         } else {
-            corners.into_iter().map(leaning).sum()
+            all()
         };
         leans >= 0.0
     }

@@ -88,11 +88,13 @@ struct Player {
 const SLACK: f64 = 1e6;
 
 impl Player {
-    /// Boxes in a row that turn and fly apart. `is_tied`: all are solved together and have all threads, without effect.
+    /// Boxes in a row that turn and fly apart, `speed` times as fast as usual. `is_tied`: all are solved together and have
+    /// all threads, without effect.
     fn new(
         bodies: usize,
         mut builder: SimulationBuilder,
         is_tied: bool,
+        speed: f64,
         threads: &[(DistanceSpec, f64)],
     ) -> Self {
         // Its corners are particles, so no cut makes one that is nearer to them.
@@ -120,7 +122,7 @@ impl Player {
         }
         let mut simulation = builder.build().unwrap();
         simulation
-            .set_velocities(|x| dvec3(0.15 * x.x, 0.2 * x.z, -0.2 * x.y))
+            .set_velocities(|x| speed * dvec3(0.15 * x.x, 0.2 * x.z, -0.2 * x.y))
             .unwrap();
         Self {
             simulation,
@@ -279,48 +281,77 @@ fn builder(method: Method, precision: Precision, substeps: u32) -> SimulationBui
     builder
 }
 
+/// Plays acts to bodies that are joined while the simulation runs, and to bodies that were tied from the start. Jacobi does
+/// not depend on the order of constraints but for rounding, so both have the same tets, the same pieces, and positions that
+/// differ as if the first velocities had been rounded otherwise.
+fn joined_equal_tied(bodies: usize, acts: &[Act]) {
+    let threads = threads(acts, bodies);
+    let player = |is_tied, speed| {
+        let builder = builder(Method::Jacobi, Precision::F64, 4);
+        Player::new(bodies, builder, is_tied, speed, &threads)
+    };
+    let (mut joined, mut tied) = (player(false, 1.0), player(true, 1.0));
+    let mut disturbed = player(true, 1.0 + 1e-13);
+    let mut sensitivity = 0.0_f64;
+    for act in acts {
+        let middle = joined.middle(body_of(act, bodies));
+        for player in [&mut joined, &mut tied, &mut disturbed] {
+            player.play(act, bodies, &threads, middle);
+        }
+        let [a, b] = [&joined.simulation, &tied.simulation];
+        for other in [a, &disturbed.simulation] {
+            assert_eq!(other.mesh().tets.len(), b.mesh().tets.len());
+            let mut pairs = other.mesh().tets.iter().zip(&b.mesh().tets);
+            assert_eq!(pairs.position(|(a, b)| a != b), None, "after {act:?}");
+            assert_eq!(other.piece_numbers(), b.piece_numbers());
+            let rest = farthest(&other.mesh().positions, &b.mesh().positions);
+            assert!(rest < 1e-9, "after {act:?}: {rest:e} at rest");
+        }
+        assert_eq!(joined.grabs.len(), tied.grabs.len());
+        assert_eq!(joined.attachments, tied.attachments);
+        // In slivers the differences grow by orders in a substep, and go again.
+        sensitivity = sensitivity.max(farthest(disturbed.simulation.positions(), b.positions()));
+        let apart = farthest(a.positions(), b.positions());
+        assert!(sensitivity < 1e-4, "after {act:?}: {sensitivity:e}");
+        assert!(
+            apart < 1e-9 + 100.0 * sensitivity,
+            "after {act:?}: {apart:e}"
+        );
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 16, failure_persistence: None, ..ProptestConfig::default() })]
 
-    /// Jacobi does not depend on the order of constraints but for rounding, so joined bodies equal bodies that were tied
-    /// from the start: same tets, same pieces, and positions of rounding's size.
     #[test]
     fn joined_bodies_are_bodies_tied_from_the_start(
         bodies in 2..5_usize,
         acts in proptest::collection::vec(act(false), 8..20),
     ) {
-        let threads = threads(&acts, bodies);
-        let player = |is_tied| {
-            let builder = builder(Method::Jacobi, Precision::F64, 4);
-            Player::new(bodies, builder, is_tied, &threads)
-        };
-        let (mut joined, mut tied) = (player(false), player(true));
-        for act in &acts {
-            let middle = joined.middle(body_of(act, bodies));
-            for player in [&mut joined, &mut tied] {
-                player.play(act, bodies, &threads, middle);
-            }
-            let [a, b] = [&joined.simulation, &tied.simulation];
-            let tets = [a, b].map(|simulation| &simulation.mesh().tets);
-            let first = (0..tets[0].len()).find(|&t| tets[0].get(t) != tets[1].get(t));
-            assert!(first.is_none(), "after {act:?}: tet {first:?} of {}, {}", tets[0].len(), tets[1].len());
-            assert_eq!(a.piece_numbers(), b.piece_numbers());
-            assert_eq!(joined.grabs.len(), tied.grabs.len());
-            assert_eq!(joined.attachments, tied.attachments);
-            let rest = farthest(&a.mesh().positions, &b.mesh().positions);
-            assert!(rest < 1e-9, "after {act:?}: {rest:e} at rest");
-            let apart = farthest(a.positions(), b.positions());
-            // Rounding of 1e-16, in some hundred substeps of motions of up to 10 m.
-            assert!(apart < 1e-9, "after {act:?}: {apart:e}");
-        }
+        joined_equal_tied(bodies, &acts);
     }
+}
+
+/// Between the first two cuts lie particles in the plane of the first that are not marked as such; rounding decided on which
+/// side of the third they were.
+#[test]
+fn rounding_does_not_choose_sides_of_a_cut_beside_an_earlier_one() {
+    let cuts = [
+        [0.6441783792399297, 0.4187466922743952, 0.7939300996261225],
+        [0.0, 0.8099102713015045, -0.9023106840952457],
+        [0.42710198820560147, 0.5387095674273501, 0.5910978841633808],
+    ];
+    let ties = [(0, 0.99), (0, 0.99), (3, 1.000_382_267_674_325_3)];
+    let cuts = cuts.map(|normal| Act::Cut(1, normal));
+    let ties = ties.map(|(body, part)| Act::Tie(body, 1, part, 0.0));
+    joined_equal_tied(2, &[cuts, ties].concat());
 }
 
 /// Plays acts without hands; the center of mass moves on as at the start, with the same momentum. Where a cut lends mass from
 /// particle to particle, the center is another one, but not the momentum.
 fn keeps_momentum(bodies: usize, acts: &[Act], builder: SimulationBuilder, tolerance: f64) {
     let threads = threads(acts, bodies);
-    let mut player = Player::new(bodies, builder, false, &threads);
+    let mut player = Player::new(bodies, builder, false, 1.0, &threads);
     let mut states: Vec<(Snapshot, Vec<DVec3>)> = Vec::new();
     let (mut start, mut masses) = (center(&player.simulation), player.simulation.masses());
     player.play(&Act::Step, bodies, &threads, DVec3::ZERO);
