@@ -19,8 +19,8 @@ use fearless_simd::{Level, Simd, SimdBase, dispatch};
 use crate::layout::Layout;
 use crate::pace::Pace;
 use crate::simd_kernel::{
-    Access, Alone, Block, BlockKernel, Buffers, Damping, Pass, PlainSplit, Sequential, Shared,
-    Split, exchange, read_all, read_changed, write_lanes,
+    Access, Alone, Block, BlockKernel, Buffers, Cells, Damping, Pass, PlainSplit, Sequential,
+    Shared, Split, exchange, read_all, read_changed, write_lanes,
 };
 use crate::team::parallel_rounds;
 use crate::{Float, TetSolve};
@@ -66,7 +66,7 @@ pub(crate) fn solve<R: Float>(
     level: Level,
     form: TetSolve,
     pass: &Pass<'_, R>,
-    cells: &mut [R::Particle],
+    cells: &mut Cells<'_, R>,
     sharing: &mut Sharing<R>,
 ) {
     match form {
@@ -82,7 +82,7 @@ pub(crate) fn solve<R: Float>(
 pub(crate) fn damp<R: Float>(
     level: Level,
     pass: &Pass<'_, R>,
-    cells: &mut [R::Particle],
+    cells: &mut Cells<'_, R>,
     sharing: &mut Sharing<R>,
 ) {
     with::<R, Damping>(level, pass, cells, sharing);
@@ -93,7 +93,7 @@ pub(crate) fn damp<R: Float>(
 fn with<R: Float, K: BlockKernel>(
     level: Level,
     pass: &Pass<'_, R>,
-    cells: &mut [R::Particle],
+    cells: &mut Cells<'_, R>,
     sharing: &mut Sharing<R>,
 ) {
     if let Some(simd) = level.as_avx512() {
@@ -110,7 +110,7 @@ fn with<R: Float, K: BlockKernel>(
 fn with<R: Float, K: BlockKernel>(
     level: Level,
     pass: &Pass<'_, R>,
-    cells: &mut [R::Particle],
+    cells: &mut Cells<'_, R>,
     sharing: &mut Sharing<R>,
 ) {
     dispatch!(level, simd => colors::<R, _, K>(simd, pass, cells, sharing));
@@ -129,7 +129,7 @@ pub(crate) fn lanes<R: Float>(level: Level) -> usize {
 fn colors<R: Float, S: Simd, K: BlockKernel>(
     simd: S,
     pass: &Pass<'_, R>,
-    cells: &mut [R::Particle],
+    cells: &mut Cells<'_, R>,
     sharing: &mut Sharing<R>,
 ) {
     let layout = pass.layout;
@@ -150,15 +150,20 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
             alone::<R, S, K>(simd, pass, cells);
             return;
         }
-        let cells = &*cells;
-        let solve = |pass: &Pass<'_, R>, cells: &[R::Particle], color: usize, chunk: usize| {
+        let Cells {
+            moved: cells,
+            positions,
+            multipliers,
+        } = &*cells;
+        let solve = |pass: &Pass<'_, R>, [cells, at]: [&[R::Particle]; 2], color, chunk| {
             let all = layout.groups_of(color);
             let own = &all[part(all.len(), chunk, chunks(color))];
-            groups::<R, S, K>(simd, pass, Shared(cells), own);
+            let seen = [cells, at, multipliers].map(Shared);
+            groups::<R, S, K>(simd, pass, seen, own);
         };
         if !pass.corrections.is_empty() || !pass.refused.is_empty() {
             parallel_rounds(colors, chunks, |color, chunk| {
-                solve(pass, cells, color, chunk);
+                solve(pass, [cells, positions], color, chunk);
             });
             return;
         }
@@ -166,13 +171,12 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
         let particles = layout.places.particles();
         let zero = || R::particle([R::ZERO; 4]);
         cells_there.resize_with(particles.len(), zero);
-        if !pass.positions.is_empty() {
+        if !positions.is_empty() {
             positions_there.resize_with(particles.len(), zero);
         }
         let (cells_there, positions_there) = (&**cells_there, &**positions_there);
         let there = Pass {
             corners: &layout.blocks.places,
-            positions: positions_there,
             ..*pass
         };
         let copiers = (particles.len() / PARTICLES_A_THREAD).clamp(1, threads);
@@ -184,7 +188,7 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
         let copy = |to: &R::Particle, from: &R::Particle| R::write(to, R::read(from));
         parallel_rounds(colors + 2, chunks_of, |round, chunk| {
             if (1..last).contains(&round) {
-                solve(&there, cells_there, round - 1, chunk);
+                solve(&there, [cells_there, positions_there], round - 1, chunk);
                 return;
             }
             let own = part(particles.len(), chunk, copiers);
@@ -199,7 +203,7 @@ fn colors<R: Float, S: Simd, K: BlockKernel>(
                 }
                 copy(&cells_there[place], cell);
                 if let Some(position) = positions_there.get(place) {
-                    copy(position, &pass.positions[particle as usize]);
+                    copy(position, &positions[particle as usize]);
                 }
             }
         });
@@ -230,17 +234,19 @@ fn part(length: usize, number: usize, parts: usize) -> Range<usize> {
 
 /// Solves all tets on this thread.
 #[inline(always)]
-fn alone<R: Float, S: Simd, K: BlockKernel>(
-    simd: S,
-    pass: &Pass<'_, R>,
-    cells: &mut [R::Particle],
-) {
+fn alone<R: Float, S: Simd, K: BlockKernel>(simd: S, pass: &Pass<'_, R>, cells: &mut Cells<'_, R>) {
     for color in 0..pass.layout.color_count() {
-        groups::<R, S, K>(simd, pass, Alone(cells), pass.layout.groups_of(color));
+        let Cells {
+            moved,
+            positions,
+            multipliers,
+        } = cells;
+        let seen = [Alone(moved), Alone(positions), Alone(multipliers)];
+        groups::<R, S, K>(simd, pass, seen, pass.layout.groups_of(color));
     }
 }
 
-/// Solves the tets of some groups of a color.
+/// Solves the tets of some groups of a color. `seen` are the cells, in the order of [`Cells`].
 ///
 /// The corners of a block stay in its buffers until another corner takes their slot or their lane has no more tets; until
 /// then no other group reads them, since clusters of a color share no particle.
@@ -248,14 +254,14 @@ fn alone<R: Float, S: Simd, K: BlockKernel>(
 fn groups<R: Float, S: Simd, K: BlockKernel>(
     simd: S,
     pass: &Pass<'_, R>,
-    particles: impl Access<R>,
+    seen: [impl Access<R>; 3],
     groups: &[u32],
 ) {
     simd.vectorize(
         #[inline(always)]
         move || {
             // Variables of their own: behind references they would be loaded again for each corner.
-            let (mut particles, mut at) = (particles, Shared(pass.positions));
+            let [mut particles, mut at, mut multipliers] = seen;
             let blocks = &pass.layout.blocks;
             let mut buffers = [Buffers::<R>::new(); TURNS];
             let mut positions = [Buffers::<R>::new(); TURNS];
@@ -283,7 +289,7 @@ fn groups<R: Float, S: Simd, K: BlockKernel>(
                         if block >= end {
                             continue;
                         }
-                        K::run(simd, pass, buffers, positions, block);
+                        K::run(simd, pass, buffers, positions, &mut multipliers, block);
                         let corners = pass.corners_of::<S>(block);
                         let following = block + 1;
                         let mut ending = blocks.active[block];
@@ -411,20 +417,14 @@ mod tests {
             });
             all.collect()
         };
-        let positions = moved(1.0);
         let pass = Pass {
             layout,
             corners: &layout.blocks.corners,
-            positions: &[],
-            multipliers: &[],
+            keeps_multipliers: false,
             corrections: &[],
             refused: &[],
             iterated: false,
             factors,
-        };
-        let damped = Pass {
-            positions: &positions,
-            ..pass
         };
         let bits = |cells: &[R::Particle]| -> Vec<[u64; 4]> {
             let all = cells.iter().map(R::read);
@@ -435,12 +435,20 @@ mod tests {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("threads start").install(|| {
                 assert_eq!(has_work_for_several(layout), threads > 1);
-                let mut cells = moved(if form.is_some() { 1.0 } else { 0.0 });
+                let (mut cells, mut positions) = match form {
+                    Some(_) => (moved(1.0), Vec::new()),
+                    None => (moved(0.0), moved(1.0)),
+                };
                 for _ in 0..3 {
                     let mut sharing = Sharing::new(Pace::of_threads_that_gain());
+                    let mut cells = Cells {
+                        moved: &mut cells,
+                        positions: &mut positions,
+                        multipliers: &mut [],
+                    };
                     match form {
                         Some(form) => solve(level, form, &pass, &mut cells, &mut sharing),
-                        None => damp(level, &damped, &mut cells, &mut sharing),
+                        None => damp(level, &pass, &mut cells, &mut sharing),
                     }
                     assert_eq!(sharing.cells.is_empty(), threads == 1, "{threads} threads");
                 }

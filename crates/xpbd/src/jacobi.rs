@@ -28,7 +28,7 @@ pub(crate) struct Jacobi<R: Float> {
 #[derive(Debug, Default)]
 struct Iterate<R: Float> {
     positions: Vec<R::Vector>,
-    multipliers: Vec<R>,
+    multipliers: Vec<[R; 4]>,
 }
 
 impl<R: Float> Default for Jacobi<R> {
@@ -54,7 +54,7 @@ impl<R: Float> Jacobi<R> {
     pub(crate) fn begin(
         &mut self,
         particles: &[R::Particle],
-        multipliers: &[R::Atomic],
+        multipliers: &[R::Particle],
         extrapolating: bool,
     ) {
         let nothing = || R::particle([R::ZERO; 4]);
@@ -66,7 +66,7 @@ impl<R: Float> Jacobi<R> {
             self.last.multipliers.clear();
             self.last
                 .multipliers
-                .extend(multipliers.iter().map(R::load));
+                .extend(multipliers.iter().map(R::read));
         }
     }
 
@@ -81,7 +81,7 @@ impl<R: Float> Jacobi<R> {
     pub(crate) fn extrapolate(
         &mut self,
         particles: &[R::Particle],
-        multipliers: &[R::Atomic],
+        multipliers: &[R::Particle],
         spectral_radius: f64,
         chebyshev_start: u32,
     ) {
@@ -99,8 +99,9 @@ impl<R: Float> Jacobi<R> {
                 store::<R>(particle, now + (now - before) * further);
             }
             for (multiplier, &before) in multipliers.iter().zip(&self.before.multipliers) {
-                let now = R::load(multiplier);
-                (now + (now - before) * further).store(multiplier);
+                let now = R::read(multiplier);
+                let leap = |k: usize| now[k] + (now[k] - before[k]) * further;
+                R::write(multiplier, std::array::from_fn(leap));
             }
         }
         std::mem::swap(&mut self.last, &mut self.before);
@@ -126,18 +127,19 @@ mod tests {
         let radius = 0.9;
         for r in [0.9, 0.5, 0.1, 0.0, -0.3, -0.9] {
             let particles = [f64::particle([1.0, 2.0, 0.0, 1.0])];
-            let multipliers = [3.0.cell()];
+            let multipliers = [f64::particle([0.0, 0.0, 3.0, 0.0])];
             let mut jacobi = Jacobi::<f64>::default();
             jacobi.restart();
             for k in 1..=30 {
                 jacobi.begin(&particles, &multipliers, true);
                 let [x, y, z, w] = f64::read(&particles[0]);
                 f64::write(&particles[0], [r * x, r * y, r * z, w]);
-                (r * f64::load(&multipliers[0])).store(&multipliers[0]);
+                let [.., multiplier, _] = f64::read(&multipliers[0]);
+                f64::write(&multipliers[0], [0.0, 0.0, r * multiplier, 0.0]);
                 jacobi.extrapolate(&particles, &multipliers, radius, 1);
                 let left = chebyshev(k, r / radius) / chebyshev(k, 1.0 / radius);
                 let [x, y, _, w] = f64::read(&particles[0]);
-                let multiplier = f64::load(&multipliers[0]);
+                let [.., multiplier, _] = f64::read(&multipliers[0]);
                 for (value, start) in [(x, 1.0), (y, 2.0), (multiplier, 3.0)] {
                     assert!((value - start * left).abs() < 1e-12, "{r}, {k}: {value}");
                 }

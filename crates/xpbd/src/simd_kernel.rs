@@ -57,10 +57,8 @@ pub(crate) struct Pass<'a, R: Float> {
     pub(crate) layout: &'a Layout<R>,
     /// Block, corner, row: the corners, as numbers of the particles of the pass.
     pub(crate) corners: &'a [u32],
-    /// Of [`Damping`] only, else empty: the particles, of which the pass changes velocities.
-    pub(crate) positions: &'a [R::Particle],
-    /// Block, number, lane: the multipliers; empty if not kept.
-    pub(crate) multipliers: &'a [R::Atomic],
+    /// Whether [`Cells::multipliers`] are kept.
+    pub(crate) keeps_multipliers: bool,
     /// Sums of the corrections of a Jacobi pass, which leaves the particles unchanged; else empty.
     pub(crate) corrections: &'a [R::Particle],
     /// Of each particle, what it would have been moved by times its mass, if the inverse mass is 0; empty if not kept.
@@ -81,16 +79,27 @@ impl<'a, R: Float> Pass<'a, R> {
     /// Whether particles alone are written, in a single iteration.
     pub(crate) fn is_plain(&self) -> bool {
         !self.iterated
-            && self.multipliers.is_empty()
+            && !self.keeps_multipliers
             && self.corrections.is_empty()
             && self.refused.is_empty()
     }
 }
 
+/// What a pass reads and writes.
+#[derive(Debug)]
+pub(crate) struct Cells<'a, R: Float> {
+    /// What is moved, with the inverse mass of each particle: positions, and in [`Damping`] velocities.
+    pub(crate) moved: &'a mut [R::Particle],
+    /// Of [`Damping`] only, else empty.
+    pub(crate) positions: &'a mut [R::Particle],
+    /// Block, number, lane, four in a cell; empty if not kept.
+    pub(crate) multipliers: &'a mut [R::Particle],
+}
+
 /// A kernel over a block of tets. Each implementation is compiled on its own; whether multipliers are kept and where
 /// corrections go is decided once a block at run time, which costs nothing measurable.
 pub(crate) trait BlockKernel {
-    /// Whether the kernel reads [`Pass::positions`].
+    /// Whether the kernel reads [`Cells::positions`].
     const READS_POSITIONS: bool = false;
 
     /// Processes the tets of a block, which share no particle. Their corners are in the buffers, positions in the second
@@ -100,6 +109,7 @@ pub(crate) trait BlockKernel {
         pass: &Pass<'_, R>,
         corners: &mut Buffers<R>,
         positions: &Buffers<R>,
+        multipliers: &mut impl Access<R>,
         block: usize,
     );
 }
@@ -123,9 +133,10 @@ impl BlockKernel for Split {
         pass: &Pass<'_, R>,
         corners: &mut Buffers<R>,
         _: &Buffers<R>,
+        multipliers: &mut impl Access<R>,
         block: usize,
     ) {
-        solve_block::<R, S>(simd, pass, corners, block, TetSolve::Split);
+        solve_block::<R, S>(simd, pass, corners, multipliers, block, TetSolve::Split);
     }
 }
 
@@ -136,6 +147,7 @@ impl BlockKernel for PlainSplit {
         pass: &Pass<'_, R>,
         corners: &mut Buffers<R>,
         _: &Buffers<R>,
+        _: &mut impl Access<R>,
         block: usize,
     ) {
         let tets = Tets::<R, S>::new(simd, pass, block);
@@ -153,9 +165,10 @@ impl BlockKernel for Block {
         pass: &Pass<'_, R>,
         corners: &mut Buffers<R>,
         _: &Buffers<R>,
+        multipliers: &mut impl Access<R>,
         block: usize,
     ) {
-        solve_block::<R, S>(simd, pass, corners, block, TetSolve::Block);
+        solve_block::<R, S>(simd, pass, corners, multipliers, block, TetSolve::Block);
     }
 }
 
@@ -166,9 +179,17 @@ impl BlockKernel for Sequential {
         pass: &Pass<'_, R>,
         corners: &mut Buffers<R>,
         _: &Buffers<R>,
+        multipliers: &mut impl Access<R>,
         block: usize,
     ) {
-        solve_block::<R, S>(simd, pass, corners, block, TetSolve::Sequential);
+        solve_block::<R, S>(
+            simd,
+            pass,
+            corners,
+            multipliers,
+            block,
+            TetSolve::Sequential,
+        );
     }
 }
 
@@ -181,6 +202,7 @@ impl BlockKernel for Damping {
         pass: &Pass<'_, R>,
         corners: &mut Buffers<R>,
         positions: &Buffers<R>,
+        _: &mut impl Access<R>,
         block: usize,
     ) {
         damp_block::<R, S>(simd, pass, corners, positions, block);
@@ -236,6 +258,7 @@ fn solve_block<R: Float, S: Simd>(
     simd: S,
     pass: &Pass<'_, R>,
     corners: &mut Buffers<R>,
+    cells: &mut impl Access<R>,
     block: usize,
     form: TetSolve,
 ) {
@@ -243,9 +266,9 @@ fn solve_block<R: Float, S: Simd>(
     let tets = Tets::<R, S>::new(simd, pass, block);
     let q = tets.gradients();
     let f = deformation::<R, S>(&x, &q);
-    let keeps = !pass.multipliers.is_empty();
+    let keeps = pass.keeps_multipliers;
     let mut multipliers = if keeps {
-        load_multipliers::<R, S>(simd, pass, block)
+        load_multipliers::<R, S>(simd, cells, block)
     } else {
         [splat::<R, S>(simd, R::ZERO); 2]
     };
@@ -281,7 +304,7 @@ fn solve_block<R: Float, S: Simd>(
         }
     }
     if keeps {
-        store_multipliers::<R, S>(pass, block, multipliers);
+        store_multipliers::<R, S>(cells, block, multipliers);
     }
     if jacobi {
         let mut changes = x;

@@ -19,7 +19,7 @@ use crate::gauss_seidel::{self, Sharing};
 use crate::jacobi::Jacobi;
 use crate::layout::Layout;
 use crate::particles::{PARALLEL_PARTICLES, Particles};
-use crate::simd_kernel::Pass;
+use crate::simd_kernel::{Cells, Pass};
 use crate::substep::Substep;
 use crate::team::{in_pool_if, keep_awake};
 use crate::tets::TetSet;
@@ -69,9 +69,10 @@ pub(crate) struct Stepper<R: Float> {
     /// The instructions that this processor has.
     #[cfg_attr(feature = "serde", serde(skip, default = "Level::new"))]
     level: Level,
-    /// By block and lane of the layout; only while a step has more than one iteration or is asked for its residuals.
+    /// By block, number and lane of the layout, four in a cell; only while a step has more than one iteration or is asked
+    /// for its residuals.
     #[cfg_attr(feature = "serde", serde(skip))]
-    multipliers: Vec<R::Atomic>,
+    multipliers: Vec<R::Particle>,
     #[cfg_attr(feature = "serde", serde(skip))]
     jacobi: Option<Jacobi<R>>,
     #[cfg_attr(feature = "serde", serde(skip))]
@@ -181,8 +182,9 @@ impl<R: Float> Stepper<R> {
         let lost = constraints.begin(particles, substep);
         self.multipliers.clear();
         if substep.has_multipliers {
-            let count = 2 * tets.layout.blocks.lanes * tets.layout.blocks.len();
-            self.multipliers.resize_with(count, || R::ZERO.cell());
+            let count = tets.layout.blocks.lanes / 2 * tets.layout.blocks.len();
+            let none = || R::particle([R::ZERO; 4]);
+            self.multipliers.resize_with(count, none);
         }
         if keep {
             let all = 0..particles.len();
@@ -245,20 +247,18 @@ impl<R: Float> Stepper<R> {
         let pass = Pass {
             layout,
             corners: &layout.blocks.corners,
-            positions: &[],
-            multipliers,
+            keeps_multipliers: !multipliers.is_empty(),
             corrections: jacobi.as_ref().map_or(&[], |jacobi| &jacobi.corrections),
             refused: &particles.refused,
             iterated: settings.iterations > 1,
             factors: substep.factors,
         };
-        gauss_seidel::solve(
-            *level,
-            settings.tet_solve,
-            &pass,
-            &mut particles.cells,
-            sharing,
-        );
+        let mut cells = Cells {
+            moved: &mut particles.cells,
+            positions: &mut [],
+            multipliers,
+        };
+        gauss_seidel::solve(*level, settings.tet_solve, &pass, &mut cells, sharing);
         let Some(jacobi) = jacobi else { return };
         jacobi.apply(&particles.cells);
         if let Method::Chebyshev {
@@ -277,9 +277,12 @@ impl<R: Float> Stepper<R> {
 }
 
 /// The multipliers of a tet after the last substep; zero if the schedule does not solve it.
-fn multipliers_of<R: Float>(layout: &Layout<R>, multipliers: &[R::Atomic], tet: usize) -> [R; 2] {
+fn multipliers_of<R: Float>(layout: &Layout<R>, multipliers: &[R::Particle], tet: usize) -> [R; 2] {
     let Some((block, lane)) = layout.slot(tet) else {
         return [R::ZERO; 2];
     };
-    [0, 1].map(|k| R::load(&multipliers[(2 * block + k) * layout.blocks.lanes + lane]))
+    [0, 1].map(|k| {
+        let number = (2 * block + k) * layout.blocks.lanes + lane;
+        R::read(&multipliers[number / 4])[number % 4]
+    })
 }

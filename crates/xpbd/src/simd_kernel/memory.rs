@@ -10,7 +10,6 @@
 
 use fearless_simd::{Simd, SimdBase, SimdFrom};
 
-use super::Pass;
 use crate::Float;
 
 /// Most lanes of any instruction set.
@@ -265,38 +264,46 @@ fn store_rows<R: Float, S: Simd>([a, b, c, d]: [R::Lanes<S>; 4], values: &mut [R
     d.store_slice(&mut values[3 * lanes..4 * lanes]);
 }
 
+/// The two multipliers of the tets in all lanes of a block.
 #[inline(always)]
 pub(super) fn load_multipliers<R: Float, S: Simd>(
     simd: S,
-    pass: &Pass<'_, R>,
+    cells: &mut impl Access<R>,
     block: usize,
 ) -> [R::Lanes<S>; 2] {
     let lanes = R::Lanes::<S>::LEN;
-    let mut multipliers = [splat::<R, S>(simd, R::ZERO); 2];
-    for (k, values) in multipliers.iter_mut().enumerate() {
-        let start = (2 * block + k) * lanes;
-        let mut buffer = [R::ZERO; MOST_LANES];
-        for (lane, cell) in pass.multipliers[start..start + lanes].iter().enumerate() {
-            buffer[lane] = R::load(cell);
-        }
-        *values = R::Lanes::<S>::from_slice(simd, &buffer[..lanes]);
+    let mut values = [[R::ZERO; 4]; MOST_LANES / 2];
+    for (cell, values) in multiplier_cells(block, lanes).zip(&mut values) {
+        *values = cells.read(cell);
     }
-    multipliers
+    let values = values.as_flattened();
+    [
+        R::Lanes::<S>::from_slice(simd, &values[..lanes]),
+        R::Lanes::<S>::from_slice(simd, &values[lanes..2 * lanes]),
+    ]
 }
 
+/// The inverse of [`load_multipliers`].
 #[inline(always)]
 pub(super) fn store_multipliers<R: Float, S: Simd>(
-    pass: &Pass<'_, R>,
+    cells: &mut impl Access<R>,
     block: usize,
-    multipliers: [R::Lanes<S>; 2],
+    [shear, volume]: [R::Lanes<S>; 2],
 ) {
     let lanes = R::Lanes::<S>::LEN;
-    for (k, values) in multipliers.into_iter().enumerate() {
-        let start = (2 * block + k) * lanes;
-        let mut buffer = [R::ZERO; MOST_LANES];
-        values.store_slice(&mut buffer[..lanes]);
-        for (lane, cell) in pass.multipliers[start..start + lanes].iter().enumerate() {
-            buffer[lane].store(cell);
-        }
+    let mut values = [[R::ZERO; 4]; MOST_LANES / 2];
+    let flat = values.as_flattened_mut();
+    shear.store_slice(&mut flat[..lanes]);
+    volume.store_slice(&mut flat[lanes..2 * lanes]);
+    for (cell, values) in multiplier_cells(block, lanes).zip(values) {
+        cells.write(cell, values);
     }
+}
+
+/// The cells of the multipliers of a block. No other block has a part of them.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "as many as particles")]
+fn multiplier_cells(block: usize, lanes: usize) -> std::ops::Range<u32> {
+    let cells = lanes / 2;
+    (block * cells) as u32..((block + 1) * cells) as u32
 }

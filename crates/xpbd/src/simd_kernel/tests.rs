@@ -108,7 +108,7 @@ impl<R: Float> Case<R> {
 
     /// The positions after a pass by the kernel.
     fn by_lanes(&self, level: Level, form: TetSolve) -> Vec<R::Vector> {
-        self.by_lanes_keeping(level, form, false, &[])
+        self.by_lanes_keeping(level, form, false, &mut [])
     }
 
     /// The layout of the tets.
@@ -155,7 +155,7 @@ impl<R: Float> Case<R> {
         level: Level,
         form: TetSolve,
         iterated: bool,
-        multipliers: &[R::Atomic],
+        multipliers: &mut [R::Particle],
     ) -> Vec<R::Vector> {
         self.paced(level, form, iterated, multipliers, &mut Sharing::default())
     }
@@ -166,7 +166,7 @@ impl<R: Float> Case<R> {
         level: Level,
         form: TetSolve,
         iterated: bool,
-        multipliers: &[R::Atomic],
+        multipliers: &mut [R::Particle],
         sharing: &mut Sharing<R>,
     ) -> Vec<R::Vector> {
         let mut particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
@@ -174,14 +174,18 @@ impl<R: Float> Case<R> {
         let pass = Pass {
             layout: &layout,
             corners: &layout.blocks.corners,
-            positions: &[],
-            multipliers,
+            keeps_multipliers: !multipliers.is_empty(),
             corrections: &[],
             refused: &[],
             iterated,
             factors: self.factors,
         };
-        gauss_seidel::solve(level, form, &pass, &mut particles, sharing);
+        let mut cells = Cells {
+            moved: &mut particles,
+            positions: &mut [],
+            multipliers,
+        };
+        gauss_seidel::solve(level, form, &pass, &mut cells, sharing);
         particles.iter().map(load::<R>).collect()
     }
 
@@ -192,7 +196,7 @@ impl<R: Float> Case<R> {
 
     /// The velocities after a damping pass on one thread or on several.
     fn damped_paced(&self, level: Level, sharing: &mut Sharing<R>) -> Vec<R::Vector> {
-        let particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
+        let mut particles: Vec<_> = self.particles.iter().map(|v| R::particle(*v)).collect();
         let weights = self.particles.iter().map(|v| v[3]);
         let mut velocities: Vec<_> = self
             .velocities
@@ -207,14 +211,18 @@ impl<R: Float> Case<R> {
         let pass = Pass {
             layout: &layout,
             corners: &layout.blocks.corners,
-            positions: &particles,
-            multipliers: &[],
+            keeps_multipliers: false,
             corrections: &[],
             refused: &[],
             iterated: false,
             factors: self.factors,
         };
-        gauss_seidel::damp(level, &pass, &mut velocities, sharing);
+        let mut cells = Cells {
+            moved: &mut velocities,
+            positions: &mut particles,
+            multipliers: &mut [],
+        };
+        gauss_seidel::damp(level, &pass, &mut cells, sharing);
         velocities.iter().map(load::<R>).collect()
     }
 
@@ -347,16 +355,16 @@ proptest! {
             (single.by_lanes(level, form), double.by_lanes(level, form), single.damped(level), double.damped(level))
         };
         let expected = run(levels()[0]);
-        let none = || -> Vec<_> { (0..2 * 600 * 16).map(|_| 0f32.cell()).collect() };
+        let none = || -> Vec<_> { (0..600 * 8).map(|_| f32::particle([0.0; 4])).collect() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(3).build().expect("threads start");
         for level in levels() {
             prop_assert_eq!(&run(level), &expected, "{:?}", level);
-            prop_assert_eq!(&single.by_lanes_keeping(level, form, false, &none()), &expected.0);
+            prop_assert_eq!(&single.by_lanes_keeping(level, form, false, &mut none()), &expected.0);
             pool.install(|| {
                 let mut sharing = Sharing::new(Pace::of_threads_that_gain());
-                prop_assert_eq!(&single.paced(level, form, false, &none(), &mut sharing), &expected.0);
+                prop_assert_eq!(&single.paced(level, form, false, &mut none(), &mut sharing), &expected.0);
                 let mut sharing = Sharing::new(Pace::of_threads_that_gain());
-                prop_assert_eq!(&double.paced(level, form, false, &[], &mut sharing), &expected.1);
+                prop_assert_eq!(&double.paced(level, form, false, &mut [], &mut sharing), &expected.1);
                 let mut sharing = Sharing::new(Pace::of_threads_that_gain());
                 prop_assert_eq!(&double.damped_paced(level, &mut sharing), &expected.3);
                 Ok(())
@@ -392,8 +400,8 @@ proptest! {
     ) {
         let (single, double) = (case::<f32>(&tets, time), case::<f64>(&tets, time));
         let run = |level: Level| {
-            let multipliers: Vec<_> = (0..80 * 16).map(|_| 1e-3f32.cell()).collect();
-            let kept = single.by_lanes_keeping(level, form, iterated, &multipliers);
+            let mut multipliers: Vec<_> = (0..80 * 4).map(|_| f32::particle([1e-3; 4])).collect();
+            let kept = single.by_lanes_keeping(level, form, iterated, &mut multipliers);
             (kept, double.by_lanes(level, form), single.damped(level), double.damped(level))
         };
         let expected = run(levels()[0]);
@@ -450,17 +458,17 @@ fn several_threads_and_kept_multipliers_change_no_bit() {
                 .map(|x| DVec3::new(x.x * (1.3 - strain), x.y + strain * x.z, x.z - strain * x.x))
         });
         let case = Case::<R>::new(&rest, &moved.collect::<Vec<_>>(), 1e-2);
-        let none = || -> Vec<_> { (0..2 * 640).map(|_| R::ZERO.cell()).collect() };
+        let none = || -> Vec<_> { (0..640 / 2).map(|_| R::particle([R::ZERO; 4])).collect() };
         for level in levels() {
             for form in [TetSolve::Split, TetSolve::Block, TetSolve::Sequential] {
                 let alone = case.by_lanes(level, form);
                 let mut sharing = Sharing::new(Pace::of_threads_that_gain());
-                let several = case.paced(level, form, false, &[], &mut sharing);
+                let several = case.paced(level, form, false, &mut [], &mut sharing);
                 assert_eq!(several, alone, "{level:?} {form:?}");
-                let kept = case.by_lanes_keeping(level, form, false, &none());
+                let kept = case.by_lanes_keeping(level, form, false, &mut none());
                 assert_eq!(kept, alone, "{level:?} {form:?}");
                 let mut sharing = Sharing::new(Pace::of_threads_that_gain());
-                let kept = case.paced(level, form, false, &none(), &mut sharing);
+                let kept = case.paced(level, form, false, &mut none(), &mut sharing);
                 assert_eq!(kept, alone, "{level:?} {form:?}");
             }
             let mut sharing = Sharing::new(Pace::of_threads_that_gain());
@@ -497,8 +505,8 @@ fn the_split_form_leaves_a_tet_at_rest_alone() {
     let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z * 1e-3];
     for time in [1e-5, 1e-1, 1e3] {
         let case = Case::<f64>::new(&[rest], &[rest], time);
-        let multipliers: Vec<_> = (0..2 * 16).map(|_| 0.0f64.cell()).collect();
-        for (iterated, multipliers) in [(false, &[][..]), (true, &multipliers)] {
+        let mut multipliers: Vec<_> = (0..8).map(|_| f64::particle([0.0; 4])).collect();
+        for (iterated, multipliers) in [(false, &mut [][..]), (true, &mut multipliers)] {
             let moved = case.by_lanes_keeping(levels()[0], TetSolve::Split, iterated, multipliers);
             for (x, at_rest) in moved.iter().zip(rest) {
                 assert!(x.distance(at_rest) <= 1e-14, "{time}: {x} for {at_rest}");
@@ -514,13 +522,14 @@ fn tets_out_of_range_stay_as_they_are() {
     for size in [1e30, 0.0] {
         for form in [TetSolve::Split, TetSolve::Block, TetSolve::Sequential] {
             let case = Case::<f32>::new(&[rest], &[rest.map(|x| x * size)], 1e-3);
-            let multipliers: Vec<_> = (0..2 * 16).map(|_| 0.0f32.cell()).collect();
+            let mut multipliers: Vec<_> = (0..8).map(|_| f32::particle([0.0; 4])).collect();
             for (level, iterated) in levels().into_iter().flat_map(|l| [(l, false), (l, true)]) {
-                let moved = case.by_lanes_keeping(level, form, iterated, &multipliers);
+                let moved = case.by_lanes_keeping(level, form, iterated, &mut multipliers);
                 for (x, before) in moved.iter().zip(&case.particles) {
                     assert_eq!(x.to_array(), before[..3], "{size:e}, {form:?}");
                 }
-                assert!(multipliers.iter().all(|m| f32::load(m).is_finite()));
+                let mut values = multipliers.iter().flat_map(f32::read);
+                assert!(values.all(f32::is_finite));
             }
         }
     }
