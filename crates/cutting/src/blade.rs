@@ -34,6 +34,9 @@ pub(crate) trait Blade: Sync {
     /// there has moved in the frame.
     fn side(&self, x: DVec3, reach: f64, drift: DVec3) -> Option<bool>;
 
+    /// Whether a point is further than a distance from where it moves now; never if it stands.
+    fn is_beyond(&self, x: DVec3, distance: f64) -> bool;
+
     /// Its normal, of any length, at a point that it touches while it stands. `length` is that of the longest edge
     /// there.
     fn touches(&self, x: DVec3, length: f64) -> Option<DVec3>;

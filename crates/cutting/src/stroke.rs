@@ -15,7 +15,8 @@
 //! a stroke in rows, or to and fro, keeps one orientation wherever its passes overlap.
 //!
 //! With a [`StrokeRegistry`] the stroke takes over what earlier strokes of the same surface left beside the edges it meets,
-//! and continues as if it were one of them.
+//! and continues as if it were one of them. What a moving blade has left behind is that of an earlier stroke: coming back
+//! along it the stroke joins it, and across it the stroke cuts it.
 //!
 //! Which particles are put on the surface: `snap`. Source: paper section 4.3, with the moving front as described here.
 //! Cost: what the edges offered and the cut cost.
@@ -36,6 +37,9 @@ use crate::stroke_registry::StrokeRegistry;
 use crate::surface::{CutSurface, Tangent};
 use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
+/// Edges beside its front by which a moving blade has left a particle behind.
+const LEFT: f64 = 2.0;
+
 /// The state of a stroke.
 #[derive(Clone, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -47,6 +51,8 @@ pub(crate) struct Stroke {
     forgotten: Vec<(TetId, bool)>,
     /// The number of the stroke in the registry.
     number: Option<u32>,
+    /// The numbers in the registry of what it has left behind.
+    behind: Vec<u32>,
     /// Whether the positive side is where the blade's own normal does not point to: the blade goes back over what it
     /// has cut, and the surface keeps its orientation.
     turned: bool,
@@ -62,6 +68,7 @@ impl Stroke {
             given: GivenSides::default(),
             forgotten: Vec::new(),
             number: None,
+            behind: Vec::new(),
             turned: false,
             heading: Vec::new(),
         }
@@ -160,8 +167,29 @@ impl Stroke {
         if let (Some(registry), Some(number)) = (registry, self.number) {
             registry.apply_delta_to_others(number, cuttable, &delta, self.options.reach());
             registry.learn(number, &mut self.surface);
+            if B::IS_SWEPT {
+                let left = self.left(cuttable, &motion.now, blade);
+                registry.leave_behind(number, &mut self.behind, &left);
+            }
         }
         Ok(delta)
+    }
+
+    /// Forgets the particles that the blade has left, and returns them.
+    fn left(
+        &mut self,
+        cuttable: &CuttableMesh,
+        now: &[DVec3],
+        blade: &impl Blade,
+    ) -> Vec<ParticleId> {
+        let mean = cuttable.mean_edge();
+        self.surface.leave(|particle| {
+            let x = now[particle.index()];
+            let around = cuttable.around(particle);
+            let neighbors = around.flat_map(|tet| cuttable.mesh.tets[tet.index()]);
+            let lengths = neighbors.map(|p| x.distance(now[p.index()]));
+            blade.is_beyond(x, LEFT * lengths.fold(mean, f64::max))
+        })
     }
 
     /// Takes the cut back, and what the stroke learned from it.

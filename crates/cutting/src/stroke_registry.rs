@@ -210,6 +210,32 @@ impl StrokeRegistry {
         adopted.len() > before
     }
 
+    /// Gives what a stroke knew of particles that it has left to strokes of other numbers, `behind`, to which numbers are
+    /// appended where a particle is on the surface of all of them.
+    pub(crate) fn leave_behind(
+        &mut self,
+        stroke: u32,
+        behind: &mut Vec<u32>,
+        particles: &[ParticleId],
+    ) {
+        for &particle in particles {
+            let of: Vec<u32> = self.entries(particle).map(|(of, _)| of).collect();
+            let Some(slot) = of.iter().position(|of| *of == stroke) else {
+                continue;
+            };
+            let free = behind.iter().copied().find(|number| !of.contains(number));
+            let number = free.unwrap_or_else(|| {
+                let number = self.next_stroke();
+                behind.push(number);
+                number
+            });
+            let slot = u32::try_from(slot).unwrap_or(u32::MAX);
+            if let Some(known) = self.known.get_mut(&(particle, slot)) {
+                known.0 = number;
+            }
+        }
+    }
+
     /// Learns what a stroke came to know since it was last asked.
     pub(crate) fn learn(&mut self, stroke: u32, surface: &mut CutSurface) {
         for (particle, mark) in surface.take_news() {

@@ -68,7 +68,7 @@ enum Seen {
 /// Part of a tet's size below which the distance of a particle from a tangent plane is rounding.
 const IN_SURFACE: f64 = 1e-9;
 
-/// The particles along the surface of a stroke. The map is never iterated.
+/// The particles along the surface of a stroke. The order of the map has no effect.
 #[derive(Clone, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct CutSurface {
@@ -140,6 +140,17 @@ impl CutSurface {
         news.sort_unstable();
         news.dedup();
         news.into_iter().map(|p| (p, self.marks[&p])).collect()
+    }
+
+    /// Forgets the particles that the blade has left, and returns them ascending.
+    pub(crate) fn leave(&mut self, has_left: impl Fn(ParticleId) -> bool) -> Vec<ParticleId> {
+        let all = self.marks.keys().copied();
+        let mut left: Vec<ParticleId> = all.filter(|p| has_left(*p)).collect();
+        left.sort_unstable();
+        for particle in &left {
+            self.marks.remove(particle);
+        }
+        left
     }
 
     /// Takes over what an earlier stroke of the same surface knew of a particle, if nothing contrary is known;

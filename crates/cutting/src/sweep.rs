@@ -112,6 +112,15 @@ impl Blade for MovingBlade {
             .flatten()
     }
 
+    fn is_beyond(&self, x: DVec3, distance: f64) -> bool {
+        self.0.iter().all(|swept| {
+            let [p, q] = swept.segment.now;
+            let along = q - p;
+            let at = ((x - p).dot(along) / along.length_squared()).clamp(0.0, 1.0);
+            x.distance(if at.is_nan() { p } else { p + along * at }) > distance
+        })
+    }
+
     fn touches(&self, _: DVec3, _: f64) -> Option<DVec3> {
         None
     }
@@ -120,7 +129,7 @@ impl Blade for MovingBlade {
 /// A stroke of a moving blade (a polyline), which cuts frame by frame.
 ///
 /// Faces open only where all three particles lie on this stroke's surface. To join an earlier stroke, a stroke must
-/// overlap it by a tet or share a [`StrokeRegistry`] with it.
+/// overlap it by a tet or share a [`StrokeRegistry`] with it. To cross its own path it needs a registry, too.
 ///
 /// # Example
 /// ```

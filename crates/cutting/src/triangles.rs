@@ -234,6 +234,10 @@ impl Blade for StandingBlade<'_> {
         self.surface.closest(x, reach)?.side()
     }
 
+    fn is_beyond(&self, _: DVec3, _: f64) -> bool {
+        false
+    }
+
     fn touches(&self, x: DVec3, length: f64) -> Option<DVec3> {
         let reach = self.tolerance * length;
         let closest = self.surface.closest(x, reach)?;

@@ -2,7 +2,7 @@
 
 use std::f64::consts::PI;
 
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use incise_cutting::{CuttableMesh, Plane, StrokeRegistry, Sweep, cut_plane};
 use incise_mesh::TetMesh;
 use incise_meshing::{Shape, generate};
@@ -122,8 +122,45 @@ fn to_and_fro() {
     }
 }
 
+/// The volumes of pieces of more than a hundredth of a body, ascending.
+fn large_pieces(body: &CuttableMesh) -> Vec<f64> {
+    let all = body.mesh().total_volume();
+    let mut volumes = volumes(body);
+    volumes.retain(|volume| *volume > 0.01 * all);
+    volumes
+}
+
+/// A path along a line, around three quarters of a circle and across the line: the loop comes off, and the rest is parted.
+fn crossing(turn: f64, shift: DVec3) -> Vec<DVec3> {
+    let (middle, radius) = (DVec3::new(0.15, 0.12, 0.0), 0.22);
+    let arc = (0..=24).map(|i| {
+        let (sin, cos) = (PI * (f64::from(i) / 16.0 - 0.5)).sin_cos();
+        middle + DVec3::new(cos, sin, 0.0) * radius
+    });
+    let start = DVec3::new(-0.9, middle.y - radius, 0.0);
+    let end = DVec3::new(middle.x - radius, -0.9, 0.0);
+    let path = std::iter::once(start).chain(arc).chain([end]);
+    path.map(|x| DQuat::from_rotation_z(turn) * x + shift)
+        .collect()
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
+
+    /// A stroke across its own path parts the body where its legs do as strokes of their own.
+    #[test]
+    fn a_path_may_cross_itself(
+        turn in 0.0..6.3_f64, x in -0.05..0.05_f64, y in -0.05..0.05_f64, step in 0.02..0.1_f64,
+        snap in prop::sample::select(vec![0.0, 0.1, 0.2]),
+        sway in prop::sample::select(vec![0.0, 0.05]),
+    ) {
+        let mesh = generate(Shape::Plate, 4_000).unwrap();
+        let blade = [DVec3::Z * -0.4, DVec3::Z * 0.4];
+        let path = poses(&crossing(turn, DVec3::new(x, y, 0.0)), step);
+        let registry = Some(StrokeRegistry::default());
+        let body = sweep(&mesh, blade, &path, sway, snap, registry);
+        prop_assert_eq!(large_pieces(&body).len(), 3, "{:?}", large_pieces(&body));
+    }
 
     /// Rows over a whole plane part a body where the plane does, wherever the blade turns around in between and however
     /// the body moves meanwhile.
