@@ -34,6 +34,9 @@ pub(crate) trait Blade: Sync {
     /// there has moved in the frame.
     fn side(&self, x: DVec3, reach: f64, drift: DVec3) -> Option<bool>;
 
+    /// True for one segment that moves: its surface turns only where its path does.
+    fn is_straight(&self) -> bool;
+
     /// Whether a point is further than a distance from where it moves now; never if it stands.
     fn is_beyond(&self, x: DVec3, distance: f64) -> bool;
 

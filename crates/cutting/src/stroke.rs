@@ -39,6 +39,8 @@ use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// Edges beside its front by which a moving blade has left a particle behind.
 const LEFT: f64 = 2.0;
+/// Largest cosine between the normals of two sheets at a corner of the path.
+const TURNED: f64 = 0.7;
 
 /// The state of a stroke.
 #[derive(Clone, Debug)]
@@ -335,9 +337,19 @@ impl Stroke {
             let old = |m: &EdgeHit| {
                 known.is_some_and(|t| {
                     let distance = t.distance(a.lerp(b, m.parameter)).abs();
-                    distance <= SAME_SHEET * a.distance(b)
+                    let length = a.distance(b);
+                    let close = distance <= SAME_SHEET * length
                         || (adopted()
-                            && distance <= SAME_SHEET * cuttable.longest_edge_around(ends))
+                            && distance <= SAME_SHEET * cuttable.longest_edge_around(ends));
+                    // Past a corner of the path it is another sheet, which begins on this one.
+                    let has_turned = || {
+                        let there = hit(cuttable, &motion.now, ends, m).tangent.normal;
+                        t.normal.dot(there).abs() < TURNED
+                    };
+                    close
+                        && !(blade.is_straight()
+                            && distance > self.options.tolerance * length
+                            && has_turned())
                 })
             };
             let (meeting, meetings) = blade.first_meeting(&motion.edge(ends), |m| !old(m))?;

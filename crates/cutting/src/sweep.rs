@@ -112,6 +112,10 @@ impl Blade for MovingBlade {
             .flatten()
     }
 
+    fn is_straight(&self) -> bool {
+        !self.is_bent()
+    }
+
     fn is_beyond(&self, x: DVec3, distance: f64) -> bool {
         self.0.iter().all(|swept| {
             let [p, q] = swept.segment.now;

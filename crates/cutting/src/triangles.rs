@@ -234,6 +234,10 @@ impl Blade for StandingBlade<'_> {
         self.surface.closest(x, reach)?.side()
     }
 
+    fn is_straight(&self) -> bool {
+        false
+    }
+
     fn is_beyond(&self, _: DVec3, _: f64) -> bool {
         false
     }

@@ -196,3 +196,38 @@ proptest! {
         }
     }
 }
+
+/// Each of these paths crosses itself and has three corners of about 90 degrees, at one of which the loop stayed tied.
+#[test]
+fn a_path_may_have_corners() {
+    let mesh = generate(Shape::Plate, 4_000).unwrap();
+    let blade = [DVec3::Z * -0.4, DVec3::Z * 0.4];
+    let corners = [
+        (-0.9, -0.1),
+        (0.25, -0.1),
+        (0.3, 0.25),
+        (-0.1, 0.3),
+        (-0.15, -0.9),
+    ];
+    for (seed, snap) in [
+        (78, 0.1),
+        (86, 0.0),
+        (90, 0.1),
+        (93, 0.1),
+        (103, 0.2),
+        (108, 0.1),
+    ] {
+        let turn = DQuat::from_rotation_z(6.3 * noise(seed, 0).abs());
+        let shift = DVec3::new(0.05 * noise(seed, 1), 0.05 * noise(seed, 2), 0.0);
+        let path = corners.map(|(x, y)| turn * DVec3::new(x, y, 0.0) + shift);
+        let path = poses(&path, 0.02 + 0.08 * noise(seed, 3).abs());
+        let registry = Some(StrokeRegistry::default());
+        let body = sweep(&mesh, blade, &path, 0.0, snap, registry);
+        assert_eq!(
+            large_pieces(&body).len(),
+            3,
+            "{seed}: {:?}",
+            large_pieces(&body)
+        );
+    }
+}
