@@ -19,7 +19,7 @@
 //! along it the stroke joins it, and across it the stroke cuts it.
 //!
 //! Which particles are put on the surface: `snap`. Source: paper section 4.3, with the moving front as described here.
-//! Cost: what the edges offered and the cut cost.
+//! Cost: what the edges offered and the cut cost, and a look at the tets around the particles near a moving blade.
 
 mod snap;
 
@@ -177,7 +177,7 @@ impl Stroke {
         Ok(delta)
     }
 
-    /// Forgets the particles that the blade has left, and returns them.
+    /// Forgets the particles that the blade has left, with the sides of tets there, and returns them.
     fn left(
         &mut self,
         cuttable: &CuttableMesh,
@@ -185,13 +185,18 @@ impl Stroke {
         blade: &impl Blade,
     ) -> Vec<ParticleId> {
         let mean = cuttable.mean_edge();
-        self.surface.leave(|particle| {
+        let left = self.surface.leave(|particle| {
             let x = now[particle.index()];
             let around = cuttable.around(particle);
             let neighbors = around.flat_map(|tet| cuttable.mesh.tets[tet.index()]);
             let lengths = neighbors.map(|p| x.distance(now[p.index()]));
             blade.is_beyond(x, LEFT * lengths.fold(mean, f64::max))
-        })
+        });
+        // They were those of a surface that comes to be another one.
+        for tet in left.iter().flat_map(|p| cuttable.around(*p)) {
+            self.given.forget(tet);
+        }
+        left
     }
 
     /// Takes the cut back, and what the stroke learned from it.
