@@ -39,8 +39,6 @@ use crate::{CutDelta, CutError, CutOptions, CuttableMesh};
 
 /// Edges beside its front by which a moving blade has left a particle behind.
 const LEFT: f64 = 2.0;
-/// Largest cosine between the normals of two sheets at a corner of the path.
-const TURNED: f64 = 0.7;
 
 /// The state of a stroke.
 #[derive(Clone, Debug)]
@@ -349,7 +347,7 @@ impl Stroke {
                     // Past a corner of the path it is another sheet, which begins on this one.
                     let has_turned = || {
                         let there = hit(cuttable, &motion.now, ends, m).tangent.normal;
-                        t.normal.dot(there).abs() < TURNED
+                        t.normal.dot(there).abs() < ALIGNED
                     };
                     close
                         && !(blade.is_straight()
