@@ -38,16 +38,10 @@ impl MovingBlade {
     /// Of the surface that the blade would trace, the closest part decides: where it is bent, the sum of the normals on
     /// both sides of the bend.
     fn side_at(&self, time: f64, x: DVec3, drift: DVec3) -> Option<bool> {
-        let closest_on = |[p, q]: [DVec3; 2]| {
-            let along = q - p;
-            let at = ((x - p).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-            (if at.is_nan() { 0.0 } else { at }, x - p)
-        };
         let nearest = self.0.iter().map(|swept| {
             let ends = swept.segment.at(time);
-            let (at, from_start) = closest_on(ends);
-            let squared = (from_start - (ends[1] - ends[0]) * at).length_squared();
-            (squared, swept.segment.velocity(at))
+            let (at, offset) = from_segment(ends, x);
+            (offset.length_squared(), swept.segment.velocity(at))
         });
         let (_, velocity) = nearest.min_by(|a, b| a.0.total_cmp(&b.0))?;
         let motion = velocity - drift;
@@ -118,10 +112,8 @@ impl Blade for MovingBlade {
 
     fn is_beyond(&self, x: DVec3, distance: f64) -> bool {
         self.0.iter().all(|swept| {
-            let [p, q] = swept.segment.now;
-            let along = q - p;
-            let at = ((x - p).dot(along) / along.length_squared()).clamp(0.0, 1.0);
-            x.distance(if at.is_nan() { p } else { p + along * at }) > distance
+            let (_, offset) = from_segment(swept.segment.now, x);
+            offset.length() > distance
         })
     }
 
@@ -321,6 +313,14 @@ impl Sweep {
         self.tets = delta.tets_after();
         self.stroke.apply_delta(cuttable, delta);
     }
+}
+
+/// Where on a segment, from 0 to 1, the point closest to another one lies, and the way from it to that one.
+fn from_segment([p, q]: [DVec3; 2], x: DVec3) -> (f64, DVec3) {
+    let (along, from_start) = (q - p, x - p);
+    let at = (from_start.dot(along) / along.length_squared()).clamp(0.0, 1.0);
+    let at = if at.is_nan() { 0.0 } else { at };
+    (at, from_start - along * at)
 }
 
 /// The segments of a blade that moves from one pose to another.
