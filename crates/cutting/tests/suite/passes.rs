@@ -147,7 +147,7 @@ fn crossing(turn: f64, shift: DVec3) -> Vec<DVec3> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(24))]
 
-    /// A stroke across its own path parts the body where its legs do as strokes of their own.
+    /// A stroke across its own path cuts its loop off and parts the rest.
     #[test]
     fn a_path_may_cross_itself(
         turn in 0.0..6.3_f64, x in -0.05..0.05_f64, y in -0.05..0.05_f64, step in 0.02..0.1_f64,
