@@ -1,11 +1,14 @@
 //! Strokes that meet earlier ones through a registry.
 
+use std::f64::consts::TAU;
+
 use glam::DVec3;
 use incise_cutting::{
     CutDelta, CuttableMesh, Plane, StrokeRegistry, Sweep, TriangleSurface, cut_plane,
     cut_surface_joining,
 };
-use incise_mesh::kuhn_box;
+use incise_mesh::{TetMesh, kuhn_box};
+use incise_meshing::{Shape, generate};
 use proptest::prelude::*;
 
 use crate::bodies::{body, check_cut, jittered_box, noise, options, volumes};
@@ -190,5 +193,57 @@ proptest! {
         sweep(&mut cut, &mut registry, blade, second, frames, snap);
         let (cut, whole) = (volumes(&cut), volumes(&whole));
         prop_assert_eq!(cut.len(), whole.len(), "{:?} {:?}", &cut, &whole);
+    }
+}
+
+/// A polygon cut out of a plate by one stroke a side: rectangles that stand, or blades that move. Strokes begin and end by
+/// `over` beyond the corners.
+fn cut_polygon(
+    mesh: &TetMesh,
+    corners: &[DVec3],
+    over: f64,
+    snap: f64,
+    moves: bool,
+) -> CuttableMesh {
+    let mut body = CuttableMesh::new(mesh.clone()).unwrap();
+    let mut registry = StrokeRegistry::default();
+    for (i, &from) in corners.iter().enumerate() {
+        let to = corners[(i + 1) % corners.len()];
+        let along = (to - from).normalize() * over;
+        let (from, to) = (from - along, to + along);
+        let down = DVec3::Z * 0.4;
+        if moves {
+            sweep(&mut body, &mut registry, [-down, down], [from, to], 9, snap);
+        } else {
+            let middle = from.midpoint(to);
+            let surface = TriangleSurface::rectangle(middle, (to - from) * 0.5, down).unwrap();
+            stand(&mut body, &mut registry, &surface, snap);
+        }
+    }
+    body
+}
+
+/// Strokes at an angle that overlap by a mean edge at their ends cut off what lies between them.
+#[test]
+fn strokes_that_overlap_at_corners() {
+    let mesh = generate(Shape::Plate, 4_000).unwrap();
+    let edge = (mesh.total_volume() / mesh.tets.len() as f64 * 6.0 * 2.0_f64.sqrt()).cbrt();
+    for (snap, moves) in [(0.0, false), (0.1, false), (0.1, true), (0.2, true)] {
+        for case in 0..10_u64 {
+            let random = |k| 0.5 + 0.5 * noise(1000 + case, k);
+            let sides = 3 + u32::try_from(case).unwrap() % 4;
+            let middle = DVec3::new(random(0) - 0.5, random(1) - 0.5, 0.0) * 0.1;
+            let (radius, turn) = (0.2 + 0.12 * random(2), TAU * random(3));
+            let corners: Vec<DVec3> = (0..sides)
+                .map(|i| {
+                    let angle = turn + TAU * f64::from(i) / f64::from(sides);
+                    middle + DVec3::new(angle.cos(), angle.sin(), 0.0) * radius
+                })
+                .collect();
+            let body = cut_polygon(&mesh, &corners, edge, snap, moves);
+            let mut pieces = volumes(&body);
+            pieces.retain(|volume| *volume > 0.01 * mesh.total_volume());
+            assert_eq!(pieces.len(), 2, "{snap} {moves} {case}: {pieces:?}");
+        }
     }
 }
