@@ -23,7 +23,7 @@ use crate::{CutDelta, CutOptions, CuttableMesh};
 ///
 /// Pass it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call
 /// [`StrokeRegistry::apply_delta`] after cuts made without it. Without a registry strokes join only if they overlap by
-/// a tet, and so do strokes that end at each other at an angle with one.
+/// a tet. With one, too, strokes at an angle must overlap by an edge at their ends to part a body there.
 ///
 /// # Example
 /// ```
