@@ -36,6 +36,7 @@ mod component_search;
 mod crumbs;
 mod cuttable;
 mod delta;
+mod ends;
 mod error;
 mod faces;
 mod finite;
@@ -72,6 +73,7 @@ pub use cuttable::CuttableMesh;
 pub use delta::{
     AddedTet, BoundaryTriangle, CutDelta, EdgePoint, FaceTag, MovedTet, RelinkedTet, RemovedTet,
 };
+pub use ends::join_ends;
 pub use error::CutError;
 pub use improve::{ImproveOptions, ImproveQueue, improve};
 pub use level_set::cut_level_set;

@@ -15,7 +15,7 @@
 use incise_mesh::{DisjointSets, ParticleId, TetId};
 
 use crate::crumbs::Crumbs;
-use crate::faces::{Behind, Face};
+use crate::faces::{Behind, Face, sorted};
 use crate::index::index;
 use crate::operation::Operation;
 
@@ -24,6 +24,15 @@ use crate::operation::Operation;
 pub(crate) struct SharedFace {
     pub(crate) tets: [TetId; 2],
     pub(crate) corners: [[ParticleId; 4]; 2],
+}
+
+impl SharedFace {
+    /// Its particles, ascending.
+    pub(crate) fn particles(&self) -> Option<[ParticleId; 3]> {
+        let [one, other] = self.corners;
+        let mut shared = one.into_iter().filter(|p| other.contains(p));
+        Some(sorted([shared.next()?, shared.next()?, shared.next()?]))
+    }
 }
 
 /// The tets around a particle and which of them hang together.

@@ -9,21 +9,21 @@
 //!
 //! Cost: a look-up for each particle around the edges met; the registry grows with the particles along all strokes.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use foldhash::fast::FixedState;
 use glam::DVec3;
 use incise_mesh::ParticleId;
 
 use crate::blade::{ALIGNED, CrossedEdge, SAME_SHEET};
-use crate::surface::{CutSurface, Mark};
+use crate::surface::{CutSurface, Mark, Tangent};
 use crate::{CutDelta, CutOptions, CuttableMesh};
 
 /// Surfaces of earlier strokes, which later strokes can continue. The caller keeps it from stroke to stroke.
 ///
 /// Pass it to [`crate::Sweep::advance_joining`] and [`crate::cut_surface_joining`]; call
 /// [`StrokeRegistry::apply_delta`] after cuts made without it. Without a registry strokes join only if they overlap by
-/// a tet. With one, too, strokes at an angle must overlap by an edge at their ends to part a body there.
+/// a tet. Strokes that end at each other at an angle divide a body after [`crate::join_ends`].
 ///
 /// # Example
 /// ```
@@ -50,6 +50,8 @@ pub struct StrokeRegistry {
     strokes: u32,
     /// For each particle and 0, 1, .. a stroke that has marked it, with the mark. Its order never affects results.
     known: HashMap<(ParticleId, u32), (u32, Mark), FixedState>,
+    /// Particles of which strokes have learned since their ends were joined.
+    fresh: HashSet<ParticleId, FixedState>,
 }
 
 impl StrokeRegistry {
@@ -71,11 +73,15 @@ impl StrokeRegistry {
                 ((p, slot), (first + stroke, mark))
             }));
         self.strokes += other.strokes;
+        let fresh = other.fresh.iter();
+        self.fresh
+            .extend(fresh.map(|p| ParticleId::new(particles + p.index())));
     }
 
     /// Removes the particles from number `particles` on, which an undone cut had added. Linear in the registry.
     pub fn truncate(&mut self, particles: usize) {
         self.known.retain(|key, _| key.0.index() < particles);
+        self.fresh.retain(|p| p.index() < particles);
     }
 
     /// Returns whether a particle is on the surface of an earlier stroke. Looks at each stroke that has marked it.
@@ -83,6 +89,32 @@ impl StrokeRegistry {
     pub fn is_on_surface(&self, particle: ParticleId) -> bool {
         self.entries(particle)
             .any(|(_, mark)| mark.tangent.is_some())
+    }
+
+    /// The earlier strokes that have a particle on their surface, with their tangent planes there.
+    pub(crate) fn surfaces_through(
+        &self,
+        particle: ParticleId,
+    ) -> impl Iterator<Item = (u32, Tangent)> + '_ {
+        let entries = self.entries(particle);
+        entries.filter_map(|(stroke, mark)| Some((stroke, mark.tangent?)))
+    }
+
+    /// Returns whether strokes have cut since their ends were joined: see [`crate::join_ends`].
+    #[must_use]
+    pub fn has_new_ends(&self) -> bool {
+        !self.fresh.is_empty()
+    }
+
+    /// The particles of which strokes have learned since the last call, ascending.
+    pub(crate) fn take_fresh(&mut self) -> Vec<ParticleId> {
+        let mut fresh: Vec<ParticleId> = self.fresh.drain().collect();
+        fresh.sort_unstable();
+        fresh
+    }
+
+    pub(crate) fn has_one_stroke(&self) -> bool {
+        self.strokes < 2
     }
 
     /// Whether each earlier stroke whose surface has a particle has another one on the same sheet, with tangent planes that
@@ -240,6 +272,7 @@ impl StrokeRegistry {
     pub(crate) fn learn(&mut self, stroke: u32, surface: &mut CutSurface) {
         for (particle, mark) in surface.take_news() {
             self.insert(particle, stroke, mark);
+            self.fresh.insert(particle);
         }
     }
 

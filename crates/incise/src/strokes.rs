@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 use incise_cutting::{
     BoundaryTriangle, CutDelta, CutOptions, FaceTag, StrokeRegistry, Sweep, carve, cut_level_set,
-    cut_plane, cut_surface_joining,
+    cut_plane, cut_surface_joining, join_ends,
 };
 
 use crate::island::Island;
@@ -53,10 +53,14 @@ pub(crate) struct Timeline {
     crumbs: f64,
     /// Whether meshes are improved where strokes cut what earlier ones have cut.
     improves: bool,
+    /// Whether strokes that end at each other are joined.
+    joins_ends: bool,
     /// For each island what is cut again; empty before the first stroke.
     recuts: Vec<Recuts>,
     /// For each island what its strokes leave for later ones to join; empty before the first stroke.
     registries: Vec<StrokeRegistry>,
+    /// The number of the stroke that has cut last.
+    latest: u32,
     /// Strokes that began or ended to cut since the events were taken.
     events: Vec<Event>,
     /// Strokes that ended without a cut since they were taken.
@@ -78,6 +82,7 @@ impl Timeline {
             tolerance,
             crumbs: scene.cutting.crumbs,
             improves: scene.cutting.improve,
+            joins_ends: scene.cutting.join_ends,
             ..Self::default()
         }
     }
@@ -280,7 +285,14 @@ impl Timeline {
 
     /// Whether a stroke begins or continues in a frame.
     pub(crate) fn is_due(&self, frame: u64) -> bool {
-        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame) || self.has_recuts()
+        self.strokes.iter().any(|stroke| stroke.frames[0] <= frame)
+            || self.has_recuts()
+            || self.has_new_ends()
+    }
+
+    /// Whether strokes in an island have cut since their ends were joined, if they are.
+    fn has_new_ends(&self) -> bool {
+        self.joins_ends && self.registries.iter().any(StrokeRegistry::has_new_ends)
     }
 
     /// Whether an island waits for its improvement.
@@ -336,8 +348,8 @@ impl Timeline {
         mut apply_delta: impl FnMut(usize, &mut Island, &CutDelta) -> Result<(), Error>,
     ) -> Result<(), Error> {
         self.solids.clear();
-        // A live stroke may have ended since the last frame and left its improvement.
-        if self.strokes.is_empty() && !self.has_recuts() {
+        // A live stroke may have ended since the last frame and left its ends and its improvement.
+        if self.strokes.is_empty() && !self.has_recuts() && !self.has_new_ends() {
             return Ok(());
         }
         self.registries
@@ -356,6 +368,7 @@ impl Timeline {
                     let stroke = stroke.options.tag;
                     self.events.push(Event::CutBegan { stroke });
                 }
+                self.latest = stroke.options.tag;
                 delta.extend_particles(&mut island.positions);
                 if self.improves {
                     self.recuts.resize_with(island_count, Recuts::default);
@@ -408,6 +421,21 @@ impl Timeline {
         // A blade on its way relies on the particles around its front.
         if self.strokes.iter().any(|stroke| !stroke.sweeps.is_empty()) {
             return Ok(());
+        }
+        for (g, registry) in self.registries.iter_mut().enumerate() {
+            if !self.joins_ends || !registry.has_new_ends() {
+                continue;
+            }
+            let island = &mut islands[g];
+            let delta = join_ends(&mut island.cuttable, registry, self.latest);
+            if delta.is_empty() {
+                continue;
+            }
+            delta.extend_particles(&mut island.positions);
+            if let Some(recuts) = self.recuts.get_mut(g) {
+                recuts.apply_delta(&delta, Some(self.latest));
+            }
+            apply_delta(g, island, &delta)?;
         }
         for (g, recuts) in self.recuts.iter_mut().enumerate() {
             if recuts.queue.is_empty() {

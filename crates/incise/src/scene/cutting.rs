@@ -17,6 +17,11 @@ pub struct CuttingSpec {
     /// blade on its way, some in each. Cut faces stay within a twentieth of an edge of where they were cut. A single stroke
     /// leaves its mesh as it cut it.
     pub improve: bool,
+    /// Whether strokes that end at each other at an angle are joined, so that a square cut by four strokes from corner to
+    /// corner comes off: sweeps, live blades, rectangles and surfaces less than about half a mean edge apart, in the first
+    /// frame without a blade on its way. After many strokes across each other a body at rest may vibrate more in single
+    /// precision.
+    pub join_ends: bool,
 }
 
 impl Default for CuttingSpec {
@@ -24,6 +29,7 @@ impl Default for CuttingSpec {
         Self {
             crumbs: 0.5,
             improve: true,
+            join_ends: false,
         }
     }
 }

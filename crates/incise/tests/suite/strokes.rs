@@ -5,7 +5,7 @@ use incise::mesh::glam::DVec3;
 use incise::report::PieceReport;
 use incise::{FrameReport, Scene, Simulation, Warning, WarningCode};
 
-use crate::support::{body, plane, simulation, sweep};
+use crate::support::{body, plane, simulation, state, sweep};
 
 /// All kinds of strokes on the first body of a scene.
 const STROKES: &str = r#"
@@ -662,4 +662,65 @@ fn improvement_keeps_contact_across_fresh_cuts() {
     // Cut faces have fewer particles, but are not without contact.
     let [plain, improved] = [plain.unwrap(), improved.unwrap()];
     assert!(2 * improved > plain, "{plain} {improved}");
+}
+
+/// The corners of a square, to be cut corner by corner.
+const SQUARE: [[f64; 3]; 5] = [
+    [-0.2, -0.17, 0.0],
+    [0.23, -0.17, 0.0],
+    [0.23, 0.21, 0.0],
+    [-0.2, 0.21, 0.0],
+    [-0.2, -0.17, 0.0],
+];
+
+/// Four strokes from corner to corner of a square with `join_ends`: it comes off when the last one has ended, in the same frame if it is one of
+/// the scene, in the next if it is a live one. From a snapshot between the two it goes on with the same bits.
+#[test]
+fn strokes_that_end_at_each_other_are_joined() {
+    let plate = "[world]\ngravity = [0.0, 0.0, 0.0]\n[contact]\n[cutting]\nimprove = false\njoin_ends = true\n\
+                 [[body]]\nshape = { kind = \"plate\", tets = 3000 }\n";
+    let blade = [[0.0, 0.0, -0.4], [0.0, 0.0, 0.4]];
+    let mut declared = plate.to_owned();
+    for (i, path) in (0_u64..).zip(SQUARE.windows(2)) {
+        let [from, to] = [path[0], path[1]].map(DVec3::from_array);
+        let blade = blade.map(|x| (DVec3::from_array(x) + from).to_array());
+        declared += &sweep([5 * i, 5 * i + 4], blade, (to - from).to_array());
+    }
+    let mut declared = simulation(&Scene::from_toml(&declared).unwrap());
+    let mut pieces = Vec::new();
+    for _ in 0..22 {
+        declared.step().unwrap();
+        pieces.push(declared.pieces().len());
+    }
+    assert_eq!(pieces[..19], [1; 19]);
+    assert_eq!(pieces[19..], [2; 3]);
+
+    let mut live = simulation(&Scene::from_toml(plate).unwrap());
+    for path in SQUARE.windows(2) {
+        let [from, to] = [path[0], path[1]].map(DVec3::from_array);
+        let pose = |t: f64| blade.map(|x| DVec3::from_array(x) + from.lerp(to, t));
+        let stroke = live.begin_stroke(&pose(0.0), 0.1).unwrap();
+        live.step().unwrap();
+        for i in 1..=4 {
+            live.move_blade(stroke, &pose(f64::from(i) / 4.0)).unwrap();
+            live.step().unwrap();
+        }
+        assert_eq!(live.pieces().len(), 1);
+        live.end_stroke(stroke).unwrap();
+    }
+    let between = live.snapshot().unwrap();
+    let mut after = Vec::new();
+    for _ in 0..2 {
+        live.restore(&between).unwrap();
+        let report = live.step().unwrap();
+        assert_eq!(report.detached.len(), 1);
+        let cut = report.cut.as_ref().unwrap();
+        assert_eq!((cut.tets_cut, cut.particles_created > 0), (0, true));
+        assert_eq!(live.pieces().len(), 2);
+        for _ in 0..3 {
+            live.step().unwrap();
+        }
+        after.push(state(&live));
+    }
+    assert!(after[0] == after[1]);
 }

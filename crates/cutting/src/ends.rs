@@ -1,0 +1,472 @@
+//! [`join_ends`]: strokes that end at each other at an angle are joined.
+//!
+//! A face opens where all three particles lie on one stroke. Where two strokes end at each other at an angle, as at the
+//! corner of a square, no face has three of one, and a tet or two tie the parts on both sides.
+//!
+//! Near a meeting of two strokes their tangent planes make four quarters. Where a stroke is on both sides of the other
+//! one, it divides them on both, else only on the side where it is. So two strokes that end at each other divide the
+//! quarter between them from the rest, one that ends at the side of the other divides one side of it, and strokes that
+//! cross divide all. A tet belongs to the quarter of its centroid. Faces between tets of divided quarters open, if they
+//! are near both planes: no tet is split, and the cut runs along faces there.
+//!
+//! Stars separate as after any cut, so an end that is near nothing stays as it is. Parts smaller than four mean tets do
+//! not come off.
+//!
+//! Source: our own. Cost: a look at the stars of the particles that came to lie on strokes since the last call, and at the
+//! particles around each face near a meeting.
+
+use std::collections::{BTreeSet, HashMap, HashSet};
+
+use foldhash::fast::FixedState;
+use glam::DVec3;
+use incise_mesh::{ParticleId, TetId, TetMesh};
+
+use crate::blade::ALIGNED;
+use crate::faces::{Behind, Face, sorted};
+use crate::operation::Operation;
+use crate::surface::Tangent;
+use crate::{CutDelta, CutOptions, CuttableMesh, StrokeRegistry};
+
+/// Mean edges from both planes within which faces open. A stroke that goes on past the other by more crosses it.
+const NEAR: f64 = 0.9;
+
+/// Mean edges within which both strokes have a particle beside the plane of the other where they meet.
+const CLOSE: f64 = 0.75;
+
+/// Mean edges within which particles count alike for the plane of a stroke.
+const CORE: f64 = 0.1;
+
+/// Parts of a smaller volume do not come off, in mean volumes.
+const SMALLEST: f64 = 4.0;
+
+/// Joins strokes at an angle that end within about half a mean edge of each other: opens the faces that tie the parts
+/// on both sides. Looks at what the strokes of `registry` have cut since the last call, and applies the delta to it.
+///
+/// Call it between strokes. A [`crate::Sweep`] that is under way relies on the tets around its blade; if there is one,
+/// pass it the delta with [`crate::Sweep::apply_delta`]. The opened faces get the tag `tag`.
+///
+/// # Determinism
+/// Equal input gives the same bits on every machine and for any number of threads.
+///
+/// # Cost
+/// In proportion to what was cut, and nothing while there is one stroke.
+///
+/// # Example
+/// ```
+/// use glam::DVec3;
+/// use incise_cutting::{
+///     CutOptions, CuttableMesh, StrokeRegistry, TriangleSurface, cut_surface_joining, join_ends,
+/// };
+/// use incise_mesh::kuhn_box;
+///
+/// let mut body = CuttableMesh::new(kuhn_box([8, 8, 2], DVec3::new(1.0, 1.0, 0.25)))?;
+/// let mut registry = StrokeRegistry::default();
+/// let options = CutOptions::default();
+/// // The four sides of a square, each from corner to corner.
+/// for (center, along) in [
+///     (DVec3::new(0.52, 0.27, 0.1), DVec3::X),
+///     (DVec3::new(0.77, 0.52, 0.1), DVec3::Y),
+///     (DVec3::new(0.52, 0.77, 0.1), DVec3::X),
+///     (DVec3::new(0.27, 0.52, 0.1), DVec3::Y),
+/// ] {
+///     let side = TriangleSurface::rectangle(center, along * 0.25, DVec3::Z * 0.5)?;
+///     let positions = body.mesh().positions.clone();
+///     cut_surface_joining(&mut body, &positions, &side, &options, &mut registry)?;
+/// }
+/// assert_eq!(body.mesh().pieces().count, 1);
+/// join_ends(&mut body, &mut registry, 4);
+/// assert_eq!(body.mesh().pieces().count, 2);
+/// # Ok::<(), incise_cutting::CutError>(())
+/// ```
+pub fn join_ends(cuttable: &mut CuttableMesh, registry: &mut StrokeRegistry, tag: u32) -> CutDelta {
+    let _span = tracing::debug_span!("cutting::join_ends").entered();
+    let fresh = registry.take_fresh();
+    let mut open = if registry.has_one_stroke() {
+        BTreeSet::new()
+    } else {
+        faces_to_open(cuttable, registry, &fresh)
+    };
+    smooth(cuttable, &mut open);
+    keep_small_parts(cuttable, &mut open);
+    // What is smaller stays already.
+    let options = CutOptions {
+        crumbs: 0.0,
+        tag,
+        ..CutOptions::default()
+    };
+    let mut seeds: Vec<ParticleId> = open.iter().flatten().copied().collect();
+    seeds.sort_unstable();
+    seeds.dedup();
+    let mut operation = Operation::begin(cuttable, &options);
+    operation.separate(
+        &seeds,
+        |_| true,
+        |face| face.particles().is_some_and(|face| open.contains(&face)),
+    );
+    let delta = operation.finish(|_, _| true);
+    registry.apply_delta(cuttable, &delta, &options);
+    delta
+}
+
+/// The faces that tie strokes which end at each other, particles ascending.
+fn faces_to_open(
+    cuttable: &CuttableMesh,
+    registry: &StrokeRegistry,
+    fresh: &[ParticleId],
+) -> BTreeSet<[ParticleId; 3]> {
+    let mut surroundings = Surroundings {
+        cuttable,
+        registry,
+        known: HashMap::default(),
+    };
+    let mut open = BTreeSet::new();
+    for tet in tets_at_meetings(cuttable, registry, fresh) {
+        for face in Face::of(tet) {
+            let particles = sorted(face.particles(&cuttable.mesh));
+            if !open.contains(&particles) && surroundings.divide(face) {
+                open.insert(particles);
+            }
+        }
+    }
+    open
+}
+
+/// Takes faces out of `open` until no part smaller than [`SMALLEST`] comes off: such a part stays with what it shares the
+/// largest area with, and its other faces open.
+fn keep_small_parts(cuttable: &CuttableMesh, open: &mut BTreeSet<[ParticleId; 3]>) {
+    let mesh = &cuttable.mesh;
+    let is_open =
+        |open: &BTreeSet<[ParticleId; 3]>, face: Face| open.contains(&sorted(face.particles(mesh)));
+    let corners: Vec<ParticleId> = open.iter().flatten().copied().collect();
+    let mut due = cuttable.tets_around(&corners);
+    due.retain(|tet| Face::of(*tet).into_iter().any(|face| is_open(open, face)));
+    let mut larger: HashSet<TetId, FixedState> = HashSet::default();
+    while let Some(tet) = due.pop() {
+        let Some(part) = small_part(cuttable, tet, &mut larger, |face| is_open(open, face)) else {
+            continue;
+        };
+        let faces = part.iter().flat_map(|tet| Face::of(*tet));
+        let outside = faces.filter_map(|face| match cuttable.faces.behind(face) {
+            Behind::Twin(twin) if is_open(open, face) => Some((face, twin.tet())),
+            _ => None,
+        });
+        let outside: Vec<(Face, TetId)> = outside.collect();
+        let corners: Vec<ParticleId> = part.iter().flat_map(|t| mesh.tets[t.index()]).collect();
+        let touching = cuttable.tets_around(&corners);
+        let groups = groups(cuttable, &touching, &outside, |face| is_open(open, face));
+        let areas = groups.into_iter().map(|faces| {
+            let area: f64 = faces.iter().map(|face| area(mesh, *face)).sum();
+            (area, faces)
+        });
+        let best = areas.reduce(|best, next| if next.0 > best.0 { next } else { best });
+        let Some((_, faces)) = best else { continue };
+        for face in faces {
+            open.remove(&sorted(face.particles(mesh)));
+        }
+        due.push(tet);
+    }
+}
+
+/// Moves tets to the other side of the open faces where that makes their area smaller: a tet whose open faces lead to one
+/// side and are larger than the others.
+fn smooth(cuttable: &CuttableMesh, open: &mut BTreeSet<[ParticleId; 3]>) {
+    let mesh = &cuttable.mesh;
+    let corners: Vec<ParticleId> = open.iter().flatten().copied().collect();
+    let mut due = cuttable.tets_around(&corners);
+    let is_open =
+        |open: &BTreeSet<[ParticleId; 3]>, face: Face| open.contains(&sorted(face.particles(mesh)));
+    while let Some(tet) = due.pop() {
+        let (mut away, mut held) = (Vec::new(), Vec::new());
+        for face in Face::of(tet) {
+            if let Behind::Twin(twin) = cuttable.faces.behind(face) {
+                let side = if is_open(open, face) {
+                    &mut away
+                } else {
+                    &mut held
+                };
+                side.push((face, twin.tet()));
+            }
+        }
+        let sum = |faces: &[(Face, TetId)]| faces.iter().map(|of| area(mesh, of.0)).sum::<f64>();
+        if away.is_empty() || sum(&away) <= (1.0 + 1e-9) * sum(&held) {
+            continue;
+        }
+        let touching = cuttable.tets_around(&mesh.tets[tet.index()]);
+        let leads = groups(cuttable, &touching, &away, |face| {
+            face.tet() == tet || is_open(open, face)
+        });
+        if leads.len() > 1 {
+            continue;
+        }
+        for (face, other) in away.into_iter().chain(held) {
+            let particles = sorted(face.particles(mesh));
+            if !open.remove(&particles) {
+                open.insert(particles);
+            }
+            due.push(other);
+        }
+    }
+}
+
+/// The faces that lead to the same part, which hangs together among the tets `near` without the open faces.
+fn groups(
+    cuttable: &CuttableMesh,
+    near: &[TetId],
+    faces: &[(Face, TetId)],
+    is_open: impl Fn(Face) -> bool,
+) -> Vec<Vec<Face>> {
+    let mut groups = Vec::new();
+    let mut seen: HashSet<TetId, FixedState> = HashSet::default();
+    for &(_, first) in faces {
+        if !seen.insert(first) {
+            continue;
+        }
+        let mut part = vec![first];
+        let mut next = 0;
+        while let Some(&tet) = part.get(next) {
+            next += 1;
+            for face in Face::of(tet) {
+                let Behind::Twin(twin) = cuttable.faces.behind(face) else {
+                    continue;
+                };
+                let is_near = near.binary_search(&twin.tet()).is_ok();
+                if is_near && !is_open(face) && !is_open(twin) && seen.insert(twin.tet()) {
+                    part.push(twin.tet());
+                }
+            }
+        }
+        let of_part = faces.iter().filter(|(_, tet)| part.contains(tet));
+        groups.push(of_part.map(|(face, _)| *face).collect());
+    }
+    groups
+}
+
+/// The tets that hang together with one without the open faces, if they are smaller than [`SMALLEST`]. Adds to `larger` those
+/// of which it is known that they are not.
+fn small_part(
+    cuttable: &CuttableMesh,
+    first: TetId,
+    larger: &mut HashSet<TetId, FixedState>,
+    is_open: impl Fn(Face) -> bool,
+) -> Option<Vec<TetId>> {
+    let smallest = SMALLEST * cuttable.mean_volume;
+    let mut known: HashSet<TetId, FixedState> = HashSet::default();
+    known.insert(first);
+    let mut part = vec![first];
+    let (mut next, mut volume) = (0, 0.0);
+    while let Some(&tet) = part.get(next) {
+        next += 1;
+        volume += cuttable.mesh.volume(tet);
+        if volume >= smallest || larger.contains(&tet) {
+            larger.extend(part);
+            return None;
+        }
+        for face in Face::of(tet) {
+            if let Behind::Twin(twin) = cuttable.faces.behind(face)
+                && !is_open(face)
+                && known.insert(twin.tet())
+            {
+                part.push(twin.tet());
+            }
+        }
+    }
+    Some(part)
+}
+
+/// Twice the area of a face at rest in m².
+fn area(mesh: &TetMesh, face: Face) -> f64 {
+    let [a, b, c] = face.particles(mesh).map(|p| mesh.positions[p.index()]);
+    DVec3::cross(b - a, c - a).length()
+}
+
+/// The strokes that are at a place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Strokes {
+    None,
+    One(u32),
+    Several,
+}
+
+impl Strokes {
+    fn and(self, other: Self) -> Self {
+        match (self, other) {
+            (one, Self::None) | (Self::None, one) => one,
+            (Self::One(one), Self::One(other)) if one == other => self,
+            _ => Self::Several,
+        }
+    }
+}
+
+/// The tets around some particles for which several strokes come close: on a tet that touches theirs. Ascending.
+fn tets_at_meetings(
+    cuttable: &CuttableMesh,
+    registry: &StrokeRegistry,
+    fresh: &[ParticleId],
+) -> Vec<TetId> {
+    let mesh = &cuttable.mesh;
+    let mut through: Vec<Option<Strokes>> = vec![None; mesh.positions.len()];
+    let mut through = |p: ParticleId| {
+        *through[p.index()].get_or_insert_with(|| {
+            let surfaces = registry.surfaces_through(p);
+            surfaces.fold(Strokes::None, |all, (of, _)| all.and(Strokes::One(of)))
+        })
+    };
+    let mut around: Vec<Option<Strokes>> = vec![None; mesh.positions.len()];
+    let mut around = |p: ParticleId| {
+        *around[p.index()].get_or_insert_with(|| {
+            let corners = cuttable.around(p).flat_map(|t| mesh.tets[t.index()]);
+            corners.fold(Strokes::None, |all, p| match all {
+                Strokes::Several => all,
+                _ => all.and(through(p)),
+            })
+        })
+    };
+    let mut tets = cuttable.tets_around(fresh);
+    tets.retain(|tet| {
+        let corners = mesh.tets[tet.index()].into_iter();
+        let all = corners.fold(Strokes::None, |all, p| all.and(around(p)));
+        all == Strokes::Several
+    });
+    tets
+}
+
+/// What lies around faces.
+struct Surroundings<'a> {
+    cuttable: &'a CuttableMesh,
+    registry: &'a StrokeRegistry,
+    /// For each particle asked for, those on surfaces in the tets around it, by stroke. Never iterated.
+    known: HashMap<ParticleId, Vec<(u32, ParticleId)>, FixedState>,
+}
+
+impl Surroundings<'_> {
+    /// Whether two strokes near a face divide the tets on both sides of it.
+    fn divide(&mut self, face: Face) -> bool {
+        let Behind::Twin(twin) = self.cuttable.faces.behind(face) else {
+            return false;
+        };
+        let mesh = &self.cuttable.mesh;
+        let tets = [face.tet(), twin.tet()];
+        let marks = self.marks(tets);
+        if marks.first().map(|mark| mark.0) == marks.last().map(|mark| mark.0) {
+            return false;
+        }
+        let [a, b, c] = face.particles(mesh).map(|p| mesh.positions[p.index()]);
+        let center = (a + b + c) / 3.0;
+        let [near, close] = [NEAR, CLOSE].map(|edges| edges * self.cuttable.mean_edge());
+        let of_strokes = marks.chunk_by(|a, b| a.0 == b.0);
+        let planes = of_strokes.filter_map(|marks| {
+            let plane = self.plane(marks, center)?;
+            let is_near = plane.distance(center).abs() <= near;
+            is_near.then_some((marks, plane))
+        });
+        let planes: Vec<(&[(u32, ParticleId)], Tangent)> = planes.collect();
+        let centroids = tets.map(|tet| centroid(mesh, tet));
+        planes.iter().enumerate().any(|(i, one)| {
+            planes[..i].iter().any(|other| {
+                let normals = [one, other].map(|stroke| stroke.1.normal);
+                if normals[0].dot(normals[1]).abs() >= ALIGNED {
+                    return false;
+                }
+                let quarters = centroids.map(|x| {
+                    let [a, b] = [one, other].map(|stroke| stroke.1.distance(x) < 0.0);
+                    quarter(a, b)
+                });
+                if quarters[0] == quarters[1] {
+                    return false;
+                }
+                let distances = [(one, other), (other, one)].map(|((marks, _), (_, plane))| {
+                    let to_plane =
+                        |mark: &(u32, ParticleId)| plane.distance(mesh.positions[mark.1.index()]);
+                    marks.iter().map(to_plane).collect::<Vec<f64>>()
+                });
+                let meet = distances
+                    .iter()
+                    .all(|of| of.iter().any(|distance| distance.abs() <= close));
+                meet && are_divided(quarters, distances.map(|of| sides(&of, near)))
+            })
+        })
+    }
+
+    /// The particles on surfaces in the tets that touch two tets, by stroke.
+    fn marks(&mut self, tets: [TetId; 2]) -> Vec<(u32, ParticleId)> {
+        let mesh = &self.cuttable.mesh;
+        let mut marks = Vec::new();
+        for corner in tets.into_iter().flat_map(|tet| mesh.tets[tet.index()]) {
+            let known = self.known.entry(corner).or_insert_with(|| {
+                let tets = self.cuttable.around(corner);
+                let mut around: Vec<ParticleId> =
+                    tets.flat_map(|tet| mesh.tets[tet.index()]).collect();
+                around.sort_unstable();
+                around.dedup();
+                let strokes = |p| {
+                    self.registry
+                        .surfaces_through(p)
+                        .map(move |(of, _)| (of, p))
+                };
+                around.into_iter().flat_map(strokes).collect()
+            });
+            marks.extend_from_slice(known);
+        }
+        marks.sort_unstable();
+        marks.dedup();
+        marks
+    }
+
+    /// The plane of one stroke near a place: the mean of those at its particles, weighted by their distance squared.
+    fn plane(&self, marks: &[(u32, ParticleId)], x: DVec3) -> Option<Tangent> {
+        let rest = &self.cuttable.mesh.positions;
+        let least = (CORE * self.cuttable.mean_edge()).powi(2);
+        let (mut point, mut normal, mut weights) = (DVec3::ZERO, DVec3::ZERO, 0.0);
+        for &(stroke, particle) in marks {
+            let mut surfaces = self.registry.surfaces_through(particle);
+            let (_, tangent) = surfaces.find(|(of, _)| *of == stroke)?;
+            let weight = 1.0 / (rest[particle.index()].distance_squared(x) + least);
+            point += weight * tangent.point;
+            normal += weight * tangent.normal;
+            weights += weight;
+        }
+        Some(Tangent {
+            point: point / weights,
+            normal: normal.try_normalize()?,
+        })
+    }
+}
+
+fn centroid(mesh: &TetMesh, tet: TetId) -> DVec3 {
+    let corners = mesh.tets[tet.index()].into_iter();
+    corners.map(|p| mesh.positions[p.index()]).sum::<DVec3>() / 4.0
+}
+
+/// On which sides of a plane particles are, by their distances from it: on one at least, and on both if they reach
+/// further than `near` on both. Of the positive side first.
+fn sides(distances: &[f64], near: f64) -> [bool; 2] {
+    let least = distances.iter().copied().fold(0.0, f64::min);
+    let most = distances.iter().copied().fold(0.0, f64::max);
+    [
+        most > near || most >= -least,
+        -least > near || -least >= most,
+    ]
+}
+
+/// The number of a quarter, by whether it is on the negative sides of the first and of the second plane: neighbors
+/// follow each other, and the first the last.
+fn quarter(one: bool, other: bool) -> usize {
+    match (one, other) {
+        (false, false) => 0,
+        (true, false) => 1,
+        (true, true) => 2,
+        (false, true) => 3,
+    }
+}
+
+/// Whether two strokes divide two quarters: on both ways around there is one between them. `reach` says for each on which
+/// sides of the other one it is.
+fn are_divided(quarters: [usize; 2], reach: [[bool; 2]; 2]) -> bool {
+    let [one, other] = reach;
+    // Between each quarter and the next.
+    let walls = [one[0], other[1], one[1], other[0]];
+    let [from, to] = [quarters[0].min(quarters[1]), quarters[0].max(quarters[1])];
+    let there = walls[from..to].contains(&true);
+    let back = walls[to..].iter().chain(&walls[..from]).any(|wall| *wall);
+    there && back
+}
