@@ -136,25 +136,30 @@ fn faces_to_open(
 /// largest area with, and its other faces open.
 fn keep_small_parts(cuttable: &CuttableMesh, open: &mut BTreeSet<[ParticleId; 3]>) {
     let mesh = &cuttable.mesh;
-    let is_open =
-        |open: &BTreeSet<[ParticleId; 3]>, face: Face| open.contains(&sorted(face.particles(mesh)));
     let corners: Vec<ParticleId> = open.iter().flatten().copied().collect();
     let mut due = cuttable.tets_around(&corners);
-    due.retain(|tet| Face::of(*tet).into_iter().any(|face| is_open(open, face)));
+    due.retain(|tet| {
+        Face::of(*tet)
+            .into_iter()
+            .any(|face| is_open(mesh, open, face))
+    });
     let mut larger: HashSet<TetId, FixedState> = HashSet::default();
     while let Some(tet) = due.pop() {
-        let Some(part) = small_part(cuttable, tet, &mut larger, |face| is_open(open, face)) else {
+        let Some(part) = small_part(cuttable, tet, &mut larger, |face| is_open(mesh, open, face))
+        else {
             continue;
         };
         let faces = part.iter().flat_map(|tet| Face::of(*tet));
         let outside = faces.filter_map(|face| match cuttable.faces.behind(face) {
-            Behind::Twin(twin) if is_open(open, face) => Some((face, twin.tet())),
+            Behind::Twin(twin) if is_open(mesh, open, face) => Some((face, twin.tet())),
             _ => None,
         });
         let outside: Vec<(Face, TetId)> = outside.collect();
         let corners: Vec<ParticleId> = part.iter().flat_map(|t| mesh.tets[t.index()]).collect();
         let touching = cuttable.tets_around(&corners);
-        let groups = groups(cuttable, &touching, &outside, |face| is_open(open, face));
+        let groups = groups(cuttable, &touching, &outside, |face| {
+            is_open(mesh, open, face)
+        });
         let areas = groups.into_iter().map(|faces| {
             let area: f64 = faces.iter().map(|face| area(mesh, *face)).sum();
             (area, faces)
@@ -174,13 +179,11 @@ fn smooth(cuttable: &CuttableMesh, open: &mut BTreeSet<[ParticleId; 3]>) {
     let mesh = &cuttable.mesh;
     let corners: Vec<ParticleId> = open.iter().flatten().copied().collect();
     let mut due = cuttable.tets_around(&corners);
-    let is_open =
-        |open: &BTreeSet<[ParticleId; 3]>, face: Face| open.contains(&sorted(face.particles(mesh)));
     while let Some(tet) = due.pop() {
         let (mut away, mut held) = (Vec::new(), Vec::new());
         for face in Face::of(tet) {
             if let Behind::Twin(twin) = cuttable.faces.behind(face) {
-                let side = if is_open(open, face) {
+                let side = if is_open(mesh, open, face) {
                     &mut away
                 } else {
                     &mut held
@@ -194,7 +197,7 @@ fn smooth(cuttable: &CuttableMesh, open: &mut BTreeSet<[ParticleId; 3]>) {
         }
         let touching = cuttable.tets_around(&mesh.tets[tet.index()]);
         let leads = groups(cuttable, &touching, &away, |face| {
-            face.tet() == tet || is_open(open, face)
+            face.tet() == tet || is_open(mesh, open, face)
         });
         if leads.len() > 1 {
             continue;
@@ -272,6 +275,10 @@ fn small_part(
         }
     }
     Some(part)
+}
+
+fn is_open(mesh: &TetMesh, open: &BTreeSet<[ParticleId; 3]>, face: Face) -> bool {
+    open.contains(&sorted(face.particles(mesh)))
 }
 
 /// Twice the area of a face at rest in m².
