@@ -152,13 +152,21 @@ fn decay(r: f32) -> f32 {
     return (6.0 + r) / (6.0 + r * (4.0 + r));
 }
 
+// `decay` of r, but no more than the step that is stable in the stiffest direction of the tet, of which the trace of G is
+// a bound.
+fn bounded_decay(tet: Tet, r: f32) -> f32 {
+    let trace = (dot(tet.diagonal, tet.diagonal) + dot(tet.below, tet.below)) * settings.time_squared;
+    let above = 6.0 + r;
+    return above / max(6.0 + r * (4.0 + r), (trace + trace) * above);
+}
+
 // The split form in a single iteration.
 fn solve_split(tet: Tet, x: Corners, f: Columns, multipliers: ptr<function, vec2<f32>>) -> Corners {
     let energies = energies_of(f);
     let twice = energies.shear + energies.shear;
     let factored = times_factor(tet, energies.derivative);
     let steepness = product(factored, factored) * settings.time_squared;
-    var fraction = decay(steepness / twice);
+    var fraction = bounded_decay(tet, steepness / twice);
     if !(energies.shear > 0.0) {
         fraction = 0.0;
     }

@@ -315,8 +315,16 @@ impl<R: Float> TetConstraint<R> {
         // (1 - e⁻ʳ) / r as in the kernel.
         let [four, six] = [4.0, 6.0].map(R::from_f64);
         let decay = |r: R| (six + r) / (six + r * (four + r));
-        let steepness = weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
-        let d1 = -(stiffness * e.deviatoric * decay(stiffness * steepness));
+        let steepness = stiffness * weighted(&e.deviatoric_gradients, &e.deviatoric_gradients);
+        // No step that is unstable in a direction of the tet: `2 Σ w |q|²` bounds its stiffness.
+        let q = self.inverse_rest;
+        let first = [0, 1, 2].map(|axis| q[axis] + q[3 + axis] + q[6 + axis]);
+        let [second, third, fourth] = [0, 3, 6].map(|row| [q[row], q[row + 1], q[row + 2]]);
+        let squares = [first, second, third, fourth].map(|[a, b, c]| a * a + b * b + c * c);
+        let trace = (0..4).fold(R::ZERO, |sum, k| sum + weights[k] * squares[k]);
+        let (part, limit) = (decay(steepness), R::ONE / ((trace + trace) * stiffness));
+        let part = if part > limit { limit } else { part };
+        let d1 = -(stiffness * e.deviatoric * part);
         let seen = e.hydrostatic + d1 * weighted(&e.deviatoric_gradients, &e.hydrostatic_gradients);
         let lame = stiffness * (self.ratio - R::ONE);
         let m = weighted(&e.hydrostatic_gradients, &e.hydrostatic_gradients);

@@ -11,7 +11,8 @@
 //! implicit factor `1 / (1 + r)` is replaced by `f(r)`. Here `f(r) = (1 - e⁻ʳ) / r`, the exact decay over the substep:
 //! the implicit factor makes each tet too soft and the explicit one too stiff, by the same amount to first order, and a
 //! colored pass adds these errors up. With f their first order cancels, so sag at rest is off by kappa squared in place
-//! of kappa. As f is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. Far
+//! of kappa. As f is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. In a flat tet,
+//! or one with a light corner, that can be beyond rest in the stiffest direction; `2 tr G` bounds the stiffness, and so the step. Far
 //! from rest that zero may be far away: `Ψ_D` has a saddle at F = 0.54, where its slope is 0 and its value is not, and
 //! the slope of the volume vanishes where a tet collapses to a line. There, and where a tet is strained by more than
 //! 0.8, a step that would raise the energy of its tet is shortened ([`Tets::descent`]). In a substep of several
@@ -433,6 +434,13 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         ]
     }
 
+    /// The trace of G.
+    #[inline(always)]
+    fn trace(&self) -> R::Lanes<S> {
+        let [xx, yy, zz, yx, zx, zy] = self.metric_factor();
+        xx * xx + yy * yy + zz * zz + yx * yx + zx * zx + zy * zy
+    }
+
     /// `G : AᵀA = |A L|²` in units of the stiffness times time squared.
     #[inline(always)]
     fn weighted(&self, a: &Matrix<R::Lanes<S>>) -> R::Lanes<S> {
@@ -713,6 +721,16 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         (six + r) / (six + r * (four + r))
     }
 
+    /// [`Self::decay`] of r, but no more than the step that is stable in the stiffest direction of the tet: the shear energy
+    /// has no curvature above `2 G`, of which the trace bounds all eigenvalues.
+    #[inline(always)]
+    fn bounded_decay(&self, r: R::Lanes<S>) -> R::Lanes<S> {
+        let (four, six) = (self.splat(R::from_f64(4.0)), self.splat(R::from_f64(6.0)));
+        let trace = self.trace() * self.time_squared;
+        let above = six + r;
+        above / (six + r * (four + r)).max((trace + trace) * above)
+    }
+
     /// The change of the corners per weight by the split form in a single iteration, and the multipliers of this
     /// iteration if there is a place for them.
     #[inline(always)]
@@ -729,7 +747,7 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         let twice = energies.shear + energies.shear;
         let factored = self.times_factor(&energies.derivative);
         let steepness = product::<R, S>(&factored, &factored) * self.time_squared;
-        let part = self.decay(steepness / twice);
+        let part = self.bounded_decay(steepness / twice);
         let part = energies.shear.simd_gt(zero).select(part, zero);
         let along = -(self.stiffness() * part);
         let mut volume = multipliers

@@ -79,10 +79,10 @@ fn results_are_those_of_the_last_version() {
          {body}damping = 0.001\n{strokes}"
     ));
     for (precision, improve, golden) in [
-        (Precision::F32, false, 0xf588_7e86_2bcf_cd37),
-        (Precision::F64, false, 0xdbd5_7f7c_6c8d_9852),
-        (Precision::F32, true, 0xa9c7_1d64_daa4_4325),
-        (Precision::F64, true, 0x197a_e0c7_774e_2362),
+        (Precision::F32, false, 0x9a16_a3f2_afa1_cc04),
+        (Precision::F64, false, 0x750c_1a65_c4df_bb87),
+        (Precision::F32, true, 0x019f_b991_69df_d27d),
+        (Precision::F64, true, 0x8dfe_c164_89ff_24ab),
     ] {
         scene.solver.precision = precision;
         scene.cutting.improve = improve;
