@@ -14,7 +14,7 @@
 //! cut, so an end that is near nothing stays as it is.
 //!
 //! Source: our own. Cost: a look at the stars of the particles that came to lie on strokes since the last call, and at the
-//! particles around each face near a meeting; where there are several strokes, a few bytes for each particle of the mesh.
+//! particles around each face near a meeting.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 
@@ -50,7 +50,7 @@ const SMALLEST: f64 = 4.0;
 /// Equal input gives the same bits on every machine and for any number of threads.
 ///
 /// # Cost
-/// In proportion to what was cut, and O(particles) bytes; nothing while there is one stroke.
+/// In proportion to what was cut; nothing while there is one stroke.
 ///
 /// # Example
 /// ```
@@ -312,16 +312,16 @@ fn tets_at_meetings(
     fresh: &[ParticleId],
 ) -> Vec<TetId> {
     let mesh = &cuttable.mesh;
-    let mut through: Vec<Option<Strokes>> = vec![None; mesh.positions.len()];
+    let mut through: HashMap<ParticleId, Strokes, FixedState> = HashMap::default();
     let mut through = |p: ParticleId| {
-        *through[p.index()].get_or_insert_with(|| {
+        *through.entry(p).or_insert_with(|| {
             let surfaces = registry.surfaces_through(p);
             surfaces.fold(Strokes::None, |all, (of, _)| all.and(Strokes::One(of)))
         })
     };
-    let mut around: Vec<Option<Strokes>> = vec![None; mesh.positions.len()];
+    let mut around: HashMap<ParticleId, Strokes, FixedState> = HashMap::default();
     let mut around = |p: ParticleId| {
-        *around[p.index()].get_or_insert_with(|| {
+        *around.entry(p).or_insert_with(|| {
             let corners = cuttable.around(p).flat_map(|t| mesh.tets[t.index()]);
             corners.fold(Strokes::None, |all, p| match all {
                 Strokes::Several => all,

@@ -131,6 +131,12 @@ impl Timeline {
         options
             .check()
             .map_err(Error::cut(&format!("{field}.snap")))?;
+        // Exact cuts leave slivers, which would come off with what is joined.
+        let ends = matches!(
+            tool,
+            Tool::Surface { .. } | Tool::Sweep { .. } | Tool::Live(_)
+        );
+        self.joins_ends &= !(ends && snap == 0.0);
         self.strokes.push(Stroke {
             field,
             tool,

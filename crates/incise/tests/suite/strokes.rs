@@ -673,11 +673,12 @@ const SQUARE: [[f64; 3]; 5] = [
     [-0.2, -0.17, 0.0],
 ];
 
-/// Four strokes from corner to corner of a square with `join_ends`: it comes off when the last one has ended, in the same frame if it is one of
-/// the scene, in the next if it is a live one. From a snapshot between the two it goes on with the same bits.
+/// Four strokes from corner to corner of a square: it comes off when the last one has ended, in the same frame if it is one of
+/// the scene, in the next if it is a live one. From a snapshot between the two it goes on with the same bits. With
+/// `join_ends = false`, and with a stroke of `snap = 0`, it does not come off.
 #[test]
 fn strokes_that_end_at_each_other_are_joined() {
-    let plate = "[world]\ngravity = [0.0, 0.0, 0.0]\n[contact]\n[cutting]\nimprove = false\njoin_ends = true\n\
+    let plate = "[world]\ngravity = [0.0, 0.0, 0.0]\n[contact]\n[cutting]\nimprove = false\n\
                  [[body]]\nshape = { kind = \"plate\", tets = 3000 }\n";
     let blade = [[0.0, 0.0, -0.4], [0.0, 0.0, 0.4]];
     let mut declared = plate.to_owned();
@@ -686,14 +687,21 @@ fn strokes_that_end_at_each_other_are_joined() {
         let blade = blade.map(|x| (DVec3::from_array(x) + from).to_array());
         declared += &sweep([5 * i, 5 * i + 4], blade, (to - from).to_array());
     }
-    let mut declared = simulation(&Scene::from_toml(&declared).unwrap());
-    let mut pieces = Vec::new();
-    for _ in 0..22 {
-        declared.step().unwrap();
-        pieces.push(declared.pieces().len());
+    let scene = Scene::from_toml(&declared).unwrap();
+    let mut apart = scene.clone();
+    apart.cutting.join_ends = false;
+    // The text ends within the last stroke.
+    let exact = Scene::from_toml(&format!("{declared}snap = 0.0\n")).unwrap();
+    for (scene, at_end) in [(scene, 2), (apart, 1), (exact, 1)] {
+        let mut declared = simulation(&scene);
+        let mut pieces = Vec::new();
+        for _ in 0..22 {
+            declared.step().unwrap();
+            pieces.push(declared.pieces().len());
+        }
+        assert_eq!(pieces[..19], [1; 19]);
+        assert_eq!(pieces[19..], [at_end; 3]);
     }
-    assert_eq!(pieces[..19], [1; 19]);
-    assert_eq!(pieces[19..], [2; 3]);
 
     let mut live = simulation(&Scene::from_toml(plate).unwrap());
     for path in SQUARE.windows(2) {
