@@ -153,6 +153,10 @@ fn a_light_corner_does_not_gain_energy() {
 }
 
 /// Tets glued to random faces of a piece, down to a hundredth of an edge in height. Some lie in each other.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a fraction of the number of faces, rounded down"
+)]
 fn glued(seed: u64, count: usize) -> TetMesh {
     let mut noise = Noise(seed);
     let first = [0.0, 1.0, 2.0, 3.0].map(|angle: f64| {
