@@ -11,11 +11,12 @@
 //! implicit factor `1 / (1 + r)` is replaced by `f(r)`. Here `f(r) = (1 - e⁻ʳ) / r`, the exact decay over the substep:
 //! the implicit factor makes each tet too soft and the explicit one too stiff, by the same amount to first order, and a
 //! colored pass adds these errors up. With f their first order cancels, so sag at rest is off by kappa squared in place
-//! of kappa. As f is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. In a flat tet,
-//! or one with a light corner, that can be beyond rest in the stiffest direction; `2 tr G` bounds the stiffness, and so the step. Far
-//! from rest that zero may be far away: `Ψ_D` has a saddle at F = 0.54, where its slope is 0 and its value is not, and
-//! the slope of the volume vanishes where a tet collapses to a line. There, and where a tet is strained by more than
-//! 0.8, a step that would raise the energy of its tet is shortened ([`Tets::descent`]). In a substep of several
+//! of kappa. As f is at most 1 and about `1 / ρ` beyond, a step never goes far beyond the linearized zero of `√U`. In a
+//! flat tet, or one with a light corner, that zero can be beyond rest in the stiffest direction, so the step is also at
+//! most the inverse of `2 tr G`, which bounds the stiffness in all directions (G: see below). Far from rest the zero may
+//! be far away: `Ψ_D` has a saddle at F = 0.54, where its slope is 0 and its value is not, and the slope of the volume
+//! vanishes where a tet collapses to a line. There, and where a tet is strained by more than 0.8, a step that would raise
+//! the energy of its tet is shortened ([`Tets::descent`]). In a substep of several
 //! iterations both parts are XPBD constraints with multipliers (shear is `√(2 Ψ_D)`), since such steps must not be
 //! repeated. E, not F, enters `Ψ_D`: in single precision `|F|² - 3` loses all digits at a strain of 1e-4.
 //!
@@ -34,7 +35,7 @@
 //!
 //! Source: Smith, de Goes, Kim 2018 (energy), Macklin and Müller 2021 (constraints), Ton-That et al. 2023 (block
 //! solve), paper equations 5 and 6 (the paper prints a minus in its equation 6; its equation 3 gives the plus used
-//! here). The split is derived in `docs/solver.md`. Cost: about 420 operations and three divisions a tet (split), 330,
+//! here). The split is derived in `docs/solver.md`. Cost: about 430 operations and three divisions a tet (split), 330,
 //! one square root and two divisions (block); in single precision 80 bytes of the layout and, of 16 bytes each, the
 //! corners that the tet before does not have, read and written: 1.5 to 2.2 in clusters of 10.
 
@@ -721,8 +722,8 @@ impl<'a, R: Float, S: Simd> Tets<'a, R, S> {
         (six + r) / (six + r * (four + r))
     }
 
-    /// [`Self::decay`] of r, but no more than the step that is stable in the stiffest direction of the tet: the shear energy
-    /// has no curvature above `2 G`, of which the trace bounds all eigenvalues.
+    /// [`Self::decay`] of r, but no more than the step that is stable in the stiffest direction of the tet: at rest no
+    /// curvature of the shear energy is above twice the largest eigenvalue of G, which the trace bounds.
     #[inline(always)]
     fn bounded_decay(&self, r: R::Lanes<S>) -> R::Lanes<S> {
         let (four, six) = (self.splat(R::from_f64(4.0)), self.splat(R::from_f64(6.0)));

@@ -19,8 +19,8 @@ pub struct CuttingSpec {
     pub improve: bool,
     /// Whether strokes that end at each other at an angle are joined, so that a square cut by four strokes from corner to
     /// corner comes off: sweeps, live blades, rectangles and surfaces less than about half a mean edge apart, in the first
-    /// frame without a blade on its way. Faces open there, no tet is split. Off
-    /// as soon as there is such a stroke of `snap = 0`, which leaves slivers.
+    /// frame without a blade on its way. Faces open there, no tet is split. Once one of these strokes has `snap = 0`, which
+    /// leaves slivers, no more ends are joined.
     pub join_ends: bool,
 }
 

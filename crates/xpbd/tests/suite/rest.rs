@@ -79,6 +79,79 @@ fn rest_is_kept_at_any_kappa_by_the_split_form_alone() {
     }
 }
 
+/// The guard against that: tets softened to kappa 1 stay at rest where the unsoftened break up (see above), and it is
+/// said what was softened. Without a limit nothing is.
+#[test]
+fn the_kappa_limit_keeps_a_stiff_body_at_rest() {
+    let mesh = kuhn_box([8, 2, 2], dvec3(8.0, 2.0, 2.0) * CELL);
+    let mut solver = body::<f32>(&mesh, RUBBER);
+    let (schedule, settings) = (plain(&mesh), substep(&solver, 100.0));
+    assert_eq!(solver.softened().tets, 0);
+
+    let substep_time = settings.substep_time();
+    solver.limit_kappa(Some(KappaLimit {
+        kappa: 1.0,
+        substep_time,
+    }));
+    for t in 0..solver.tet_count() {
+        solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
+    }
+    let softened = solver.softened();
+    assert_eq!(softened.tets, solver.tet_count());
+    assert!((softened.volume_fraction - 1.0).abs() < 1e-12);
+    assert!(
+        (softened.strongest / 100.0 - 1.0).abs() < 1e-5,
+        "{}",
+        softened.strongest
+    );
+
+    let start = positions(&solver);
+    for _ in 0..1000 {
+        solver.step(&schedule, &settings).unwrap();
+    }
+    within(
+        "drift",
+        largest_distance(&positions(&solver), &start) / CELL,
+        1e-5,
+    );
+}
+
+/// One tet is solved exactly whatever the stiffness: both multipliers are the ones at rest and their pushes cancel.
+/// The pushes themselves grow with kappa, so the rounding left is kappa times the last digit, here at most 4 times:
+/// below 1e-6 of the tet up to kappa 2 in single precision, below 1e-13 up to kappa 100 in double precision. It is not
+/// the solve that is lacking then, but the positions: two opposite pushes of kappa times the tet's size are added.
+#[test]
+fn one_tet_at_rest_is_solved_exactly_at_any_kappa() {
+    for kappa in [1e-3, 1.0, 1e2, 1e3, 1e6] {
+        within(
+            "f64",
+            tet_displacement::<f64>(kappa),
+            4.0 * f64::EPSILON * f64::max(kappa, 1.0),
+        );
+        let epsilon = f64::from(f32::EPSILON);
+        within(
+            "f32",
+            tet_displacement::<f32>(kappa),
+            4.0 * epsilon * f64::max(kappa, 1.0),
+        );
+    }
+}
+
+/// The largest displacement of a corner of a unit tet at rest in one substep.
+fn tet_displacement<R: Real>(kappa: f64) -> f64 {
+    let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+    let mut solver = Solver::<R>::new(&rest);
+    solver.add_material(RUBBER).unwrap();
+    solver.push_tet([0, 1, 2, 3], rest, 0);
+    for p in 0..4 {
+        solver.set_mass(p, RUBBER.density / 24.0);
+    }
+    let schedule = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
+    let settings = substep(&solver, kappa);
+    solver.step(&schedule, &settings).unwrap();
+    largest_distance(&positions(&solver), &rest)
+}
+
 /// The kinetic energy of a free body after so many substeps of 0.26 ms, over that of the random motion it starts with.
 fn energy_kept<R: Real>(mesh: &TetMesh, material: Material, speed: f64, count: usize) -> f64 {
     let mut solver = body::<R>(mesh, material);
@@ -209,77 +282,4 @@ proptest! {
         let kept = energy_kept::<f64>(&glued(seed, count), material, 1e-6, 8_000);
         prop_assert!(kept <= 1.0, "{kept}");
     }
-}
-
-/// The guard against that: tets softened to kappa 1 stay at rest where the unsoftened break up (see above), and it is
-/// said what was softened. Without a limit nothing is.
-#[test]
-fn the_kappa_limit_keeps_a_stiff_body_at_rest() {
-    let mesh = kuhn_box([8, 2, 2], dvec3(8.0, 2.0, 2.0) * CELL);
-    let mut solver = body::<f32>(&mesh, RUBBER);
-    let (schedule, settings) = (plain(&mesh), substep(&solver, 100.0));
-    assert_eq!(solver.softened().tets, 0);
-
-    let substep_time = settings.substep_time();
-    solver.limit_kappa(Some(KappaLimit {
-        kappa: 1.0,
-        substep_time,
-    }));
-    for t in 0..solver.tet_count() {
-        solver.replace_tet(t, solver.tet_particles(t), mesh.corners(TetId::new(t)));
-    }
-    let softened = solver.softened();
-    assert_eq!(softened.tets, solver.tet_count());
-    assert!((softened.volume_fraction - 1.0).abs() < 1e-12);
-    assert!(
-        (softened.strongest / 100.0 - 1.0).abs() < 1e-5,
-        "{}",
-        softened.strongest
-    );
-
-    let start = positions(&solver);
-    for _ in 0..1000 {
-        solver.step(&schedule, &settings).unwrap();
-    }
-    within(
-        "drift",
-        largest_distance(&positions(&solver), &start) / CELL,
-        1e-5,
-    );
-}
-
-/// One tet is solved exactly whatever the stiffness: both multipliers are the ones at rest and their pushes cancel.
-/// The pushes themselves grow with kappa, so the rounding left is kappa times the last digit, here at most 4 times:
-/// below 1e-6 of the tet up to kappa 2 in single precision, below 1e-13 up to kappa 100 in double precision. It is not
-/// the solve that is lacking then, but the positions: two opposite pushes of kappa times the tet's size are added.
-#[test]
-fn one_tet_at_rest_is_solved_exactly_at_any_kappa() {
-    for kappa in [1e-3, 1.0, 1e2, 1e3, 1e6] {
-        within(
-            "f64",
-            tet_displacement::<f64>(kappa),
-            4.0 * f64::EPSILON * f64::max(kappa, 1.0),
-        );
-        let epsilon = f64::from(f32::EPSILON);
-        within(
-            "f32",
-            tet_displacement::<f32>(kappa),
-            4.0 * epsilon * f64::max(kappa, 1.0),
-        );
-    }
-}
-
-/// The largest displacement of a corner of a unit tet at rest in one substep.
-fn tet_displacement<R: Real>(kappa: f64) -> f64 {
-    let rest = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
-    let mut solver = Solver::<R>::new(&rest);
-    solver.add_material(RUBBER).unwrap();
-    solver.push_tet([0, 1, 2, 3], rest, 0);
-    for p in 0..4 {
-        solver.set_mass(p, RUBBER.density / 24.0);
-    }
-    let schedule = Schedule::new(&Clustering::none(1), &Coloring::new(vec![ColorId(0)]));
-    let settings = substep(&solver, kappa);
-    solver.step(&schedule, &settings).unwrap();
-    largest_distance(&positions(&solver), &rest)
 }
