@@ -24,6 +24,7 @@ use incise_mesh::{ParticleId, TetId, TetMesh};
 
 use crate::blade::ALIGNED;
 use crate::faces::{Behind, Face, sorted};
+use crate::index::index;
 use crate::operation::Operation;
 use crate::surface::Tangent;
 use crate::{CutDelta, CutOptions, CuttableMesh, StrokeRegistry};
@@ -115,16 +116,20 @@ fn faces_to_open(
     registry: &StrokeRegistry,
     fresh: &[ParticleId],
 ) -> BTreeSet<[ParticleId; 3]> {
-    let mut surroundings = Surroundings {
-        cuttable,
-        registry,
-        known: HashMap::default(),
-    };
+    let mut surroundings = Surroundings::new(cuttable, registry);
     let mut open = BTreeSet::new();
-    for tet in tets_at_meetings(cuttable, registry, fresh) {
+    let tets = surroundings.tets_at_meetings(fresh);
+    for &tet in &tets {
         for face in Face::of(tet) {
+            let Behind::Twin(twin) = cuttable.faces.behind(face) else {
+                continue;
+            };
+            // From the other side it is looked at, too.
+            if twin.tet() < tet && tets.binary_search(&twin.tet()).is_ok() {
+                continue;
+            }
             let particles = sorted(face.particles(&cuttable.mesh));
-            if !open.contains(&particles) && surroundings.divide(face) {
+            if surroundings.divide([tet, twin.tet()], particles) {
                 open.insert(particles);
             }
         }
@@ -305,69 +310,132 @@ impl Strokes {
     }
 }
 
-/// The tets around some particles for which several strokes come close: on a tet that touches theirs. Ascending.
-fn tets_at_meetings(
-    cuttable: &CuttableMesh,
-    registry: &StrokeRegistry,
-    fresh: &[ParticleId],
-) -> Vec<TetId> {
-    let mesh = &cuttable.mesh;
-    let mut through: HashMap<ParticleId, Strokes, FixedState> = HashMap::default();
-    let mut through = |p: ParticleId| {
-        *through.entry(p).or_insert_with(|| {
-            let surfaces = registry.surfaces_through(p);
-            surfaces.fold(Strokes::None, |all, (of, _)| all.and(Strokes::One(of)))
-        })
-    };
-    let mut around: HashMap<ParticleId, Strokes, FixedState> = HashMap::default();
-    let mut around = |p: ParticleId| {
-        *around.entry(p).or_insert_with(|| {
-            let corners = cuttable.around(p).flat_map(|t| mesh.tets[t.index()]);
-            corners.fold(Strokes::None, |all, p| match all {
-                Strokes::Several => all,
-                _ => all.and(through(p)),
-            })
-        })
-    };
-    let mut tets = cuttable.tets_around(fresh);
-    tets.retain(|tet| {
-        let corners = mesh.tets[tet.index()].into_iter();
-        let all = corners.fold(Strokes::None, |all, p| all.and(around(p)));
-        all == Strokes::Several
-    });
-    tets
-}
-
-/// What lies around faces.
+/// What lies around faces near strokes. Its maps are never iterated.
 struct Surroundings<'a> {
     cuttable: &'a CuttableMesh,
     registry: &'a StrokeRegistry,
-    /// For each particle asked for, those on surfaces in the tets around it, by stroke. Never iterated.
-    known: HashMap<ParticleId, Vec<(u32, ParticleId)>, FixedState>,
+    /// For each particle asked for its place, or [`NONE`] if no stroke passes it.
+    numbers: HashMap<ParticleId, u32, FixedState>,
+    places: Vec<Place>,
+    /// The strokes through the places, with their tangent planes there.
+    tangents: Vec<(u32, Tangent)>,
+    /// For each particle asked for, where in `near` the places in the tets around it are.
+    around: HashMap<ParticleId, [u32; 2], FixedState>,
+    near: Vec<u32>,
+    /// Faces asked for.
+    faces: u32,
+    planes: Vec<MeanPlane>,
+    /// For each place near a face and stroke through it, the number of its plane and the place.
+    marks: Vec<(u32, u32)>,
 }
 
-impl Surroundings<'_> {
-    /// Whether two strokes near a face divide the tets on both sides of it.
-    fn divide(&mut self, face: Face) -> bool {
-        let Behind::Twin(twin) = self.cuttable.faces.behind(face) else {
-            return false;
-        };
+/// No place.
+const NONE: u32 = u32::MAX;
+
+/// A particle that strokes pass.
+struct Place {
+    rest: DVec3,
+    /// Start and end of its tangents.
+    tangents: [u32; 2],
+    /// The last face near which it was.
+    face: u32,
+}
+
+/// The plane of one stroke near a face: the weighted mean of those at its particles.
+#[derive(Default)]
+struct MeanPlane {
+    stroke: u32,
+    point: DVec3,
+    normal: DVec3,
+    weights: f64,
+}
+
+impl<'a> Surroundings<'a> {
+    fn new(cuttable: &'a CuttableMesh, registry: &'a StrokeRegistry) -> Self {
+        Self {
+            cuttable,
+            registry,
+            numbers: HashMap::default(),
+            places: Vec::new(),
+            tangents: Vec::new(),
+            around: HashMap::default(),
+            near: Vec::new(),
+            faces: 0,
+            planes: Vec::new(),
+            marks: Vec::new(),
+        }
+    }
+
+    /// The place of a particle, or [`NONE`].
+    fn number(&mut self, particle: ParticleId) -> u32 {
+        *self.numbers.entry(particle).or_insert_with(|| {
+            let start = self.tangents.len();
+            self.tangents
+                .extend(self.registry.surfaces_through(particle));
+            let tangents = [start, self.tangents.len()].map(index);
+            if tangents[0] == tangents[1] {
+                return NONE;
+            }
+            self.places.push(Place {
+                rest: self.cuttable.mesh.positions[particle.index()],
+                tangents,
+                face: 0,
+            });
+            index(self.places.len() - 1)
+        })
+    }
+
+    /// The tets around some particles for which several strokes come close: on a tet that touches theirs. Ascending.
+    fn tets_at_meetings(&mut self, fresh: &[ParticleId]) -> Vec<TetId> {
+        let cuttable = self.cuttable;
+        let mut known: HashMap<ParticleId, Strokes, FixedState> = HashMap::default();
+        let mut tets = cuttable.tets_around(fresh);
+        tets.retain(|tet| {
+            let corners = cuttable.mesh.tets[tet.index()].into_iter();
+            let all = corners.fold(Strokes::None, |all, p| match all {
+                Strokes::Several => all,
+                _ => all.and(*known.entry(p).or_insert_with(|| self.strokes_around(p))),
+            });
+            all == Strokes::Several
+        });
+        tets
+    }
+
+    /// The strokes of the particles in the tets around one.
+    fn strokes_around(&mut self, particle: ParticleId) -> Strokes {
+        let tets = self.cuttable.around(particle);
+        let corners = tets.flat_map(|tet| self.cuttable.mesh.tets[tet.index()]);
+        let mut all = Strokes::None;
+        for p in corners {
+            let number = self.number(p);
+            if let Some(place) = self.places.get(number as usize) {
+                let [start, end] = place.tangents.map(|at| at as usize);
+                for (stroke, _) in &self.tangents[start..end] {
+                    all = all.and(Strokes::One(*stroke));
+                }
+            }
+            if all == Strokes::Several {
+                break;
+            }
+        }
+        all
+    }
+
+    /// Whether two strokes near the face between two tets divide them.
+    fn divide(&mut self, tets: [TetId; 2], face: [ParticleId; 3]) -> bool {
         let mesh = &self.cuttable.mesh;
-        let tets = [face.tet(), twin.tet()];
-        let marks = self.marks(tets);
-        if marks.first().map(|mark| mark.0) == marks.last().map(|mark| mark.0) {
+        let [a, b, c] = face.map(|p| mesh.positions[p.index()]);
+        let center = (a + b + c) / 3.0;
+        self.look_around(tets, center);
+        if self.planes.len() < 2 {
             return false;
         }
-        let [a, b, c] = face.particles(mesh).map(|p| mesh.positions[p.index()]);
-        let center = (a + b + c) / 3.0;
         let [near, close] = [NEAR, CLOSE].map(|edges| edges * self.cuttable.mean_edge());
-        let of_strokes = marks.chunk_by(|a, b| a.0 == b.0);
-        let planes = of_strokes.filter_map(|marks| {
-            let plane = self.plane(marks, center)?;
-            let is_near = plane.distance(center).abs() <= near;
-            is_near.then_some((marks, plane))
+        let planes = (0..).zip(&self.planes).filter_map(|(number, mean)| {
+            let plane = mean.plane()?;
+            (plane.distance(center).abs() <= near).then_some((number, plane))
         });
-        let planes: Vec<(&[(u32, ParticleId)], Tangent)> = planes.collect();
+        let planes: Vec<(u32, Tangent)> = planes.collect();
         let centroids = tets.map(|tet| centroid(mesh, tet));
         planes.iter().enumerate().any(|(i, one)| {
             planes[..i].iter().any(|other| {
@@ -382,10 +450,10 @@ impl Surroundings<'_> {
                 if quarters[0] == quarters[1] {
                     return false;
                 }
-                let distances = [(one, other), (other, one)].map(|((marks, _), (_, plane))| {
-                    let to_plane =
-                        |mark: &(u32, ParticleId)| plane.distance(mesh.positions[mark.1.index()]);
-                    marks.iter().map(to_plane).collect::<Vec<f64>>()
+                let distances = [(one, other), (other, one)].map(|((stroke, _), (_, plane))| {
+                    let marks = self.marks.iter().filter(|(of, _)| of == stroke);
+                    let rest = marks.map(|(_, place)| self.places[*place as usize].rest);
+                    rest.map(|x| plane.distance(x)).collect::<Vec<f64>>()
                 });
                 let meet = distances
                     .iter()
@@ -395,47 +463,72 @@ impl Surroundings<'_> {
         })
     }
 
-    /// The particles on surfaces in the tets that touch two tets, by stroke.
-    fn marks(&mut self, tets: [TetId; 2]) -> Vec<(u32, ParticleId)> {
-        let mesh = &self.cuttable.mesh;
-        let mut marks = Vec::new();
-        for corner in tets.into_iter().flat_map(|tet| mesh.tets[tet.index()]) {
-            let known = self.known.entry(corner).or_insert_with(|| {
-                let tets = self.cuttable.around(corner);
-                let mut around: Vec<ParticleId> =
-                    tets.flat_map(|tet| mesh.tets[tet.index()]).collect();
-                around.sort_unstable();
-                around.dedup();
-                let strokes = |p| {
-                    self.registry
-                        .surfaces_through(p)
-                        .map(move |(of, _)| (of, p))
-                };
-                around.into_iter().flat_map(strokes).collect()
-            });
-            marks.extend_from_slice(known);
+    /// Finds `planes` and `marks` of the places in the tets that touch two tets. A place weighs by its distance from `x`
+    /// squared, alike within [`CORE`].
+    fn look_around(&mut self, tets: [TetId; 2], x: DVec3) {
+        self.faces += 1;
+        self.planes.clear();
+        self.marks.clear();
+        let least = (CORE * self.cuttable.mean_edge()).powi(2);
+        for corner in tets
+            .into_iter()
+            .flat_map(|t| self.cuttable.mesh.tets[t.index()])
+        {
+            let [start, end] = self.places_around(corner).map(|at| at as usize);
+            for &number in &self.near[start..end] {
+                let place = &mut self.places[number as usize];
+                if place.face == self.faces {
+                    continue;
+                }
+                place.face = self.faces;
+                let weight = 1.0 / (place.rest.distance_squared(x) + least);
+                let [start, end] = place.tangents.map(|at| at as usize);
+                for &(stroke, tangent) in &self.tangents[start..end] {
+                    let known = self.planes.iter().position(|plane| plane.stroke == stroke);
+                    let plane = known.unwrap_or_else(|| {
+                        self.planes.push(MeanPlane {
+                            stroke,
+                            ..MeanPlane::default()
+                        });
+                        self.planes.len() - 1
+                    });
+                    self.planes[plane].add(weight, tangent);
+                    self.marks.push((index(plane), number));
+                }
+            }
         }
-        marks.sort_unstable();
-        marks.dedup();
-        marks
     }
 
-    /// The plane of one stroke near a place: the mean of those at its particles, weighted by their distance squared.
-    fn plane(&self, marks: &[(u32, ParticleId)], x: DVec3) -> Option<Tangent> {
-        let rest = &self.cuttable.mesh.positions;
-        let least = (CORE * self.cuttable.mean_edge()).powi(2);
-        let (mut point, mut normal, mut weights) = (DVec3::ZERO, DVec3::ZERO, 0.0);
-        for &(stroke, particle) in marks {
-            let mut surfaces = self.registry.surfaces_through(particle);
-            let (_, tangent) = surfaces.find(|(of, _)| *of == stroke)?;
-            let weight = 1.0 / (rest[particle.index()].distance_squared(x) + least);
-            point += weight * tangent.point;
-            normal += weight * tangent.normal;
-            weights += weight;
+    /// Where in `near` the places in the tets around a particle are.
+    fn places_around(&mut self, particle: ParticleId) -> [u32; 2] {
+        if let Some(known) = self.around.get(&particle) {
+            return *known;
         }
+        let start = self.near.len();
+        let tets = self.cuttable.around(particle);
+        for p in tets.flat_map(|tet| self.cuttable.mesh.tets[tet.index()]) {
+            let number = self.number(p);
+            if number != NONE && !self.near[start..].contains(&number) {
+                self.near.push(number);
+            }
+        }
+        let range = [start, self.near.len()].map(index);
+        self.around.insert(particle, range);
+        range
+    }
+}
+
+impl MeanPlane {
+    fn add(&mut self, weight: f64, tangent: Tangent) {
+        self.point += weight * tangent.point;
+        self.normal += weight * tangent.normal;
+        self.weights += weight;
+    }
+
+    fn plane(&self) -> Option<Tangent> {
         Some(Tangent {
-            point: point / weights,
-            normal: normal.try_normalize()?,
+            point: self.point / self.weights,
+            normal: self.normal.try_normalize()?,
         })
     }
 }
