@@ -35,8 +35,8 @@ pub use collider::{ColliderSpec, RotationSpec};
 pub use contact::{ContactPairs, ContactSpec};
 pub use cutting::CuttingSpec;
 pub use distance::{DistanceSpec, EndSpec};
-use lines::line_of_message;
 pub use lines::{line_of, location};
+use lines::{line_of_message, named};
 pub use method::{Integrator, Method, TetSolve};
 pub use preset::Preset;
 pub use region::Region;
@@ -400,7 +400,7 @@ impl Scene {
             let line = error
                 .span()
                 .map(|span| line_of_message(text, span.start, message));
-            let named = error.span().and_then(|span| text.get(span));
+            let named = error.span().map(|span| named(text, span));
             Error::Parse {
                 line,
                 message: in_scene_words(message, named.unwrap_or_default()),

@@ -2,6 +2,7 @@
 //!
 //! Cost: that of reading the text once more.
 
+use std::ops::Range;
 use std::path::Path;
 
 use toml::de::{DeTable, DeValue};
@@ -50,6 +51,18 @@ pub fn line_of(text: &str, key: &str) -> Option<usize> {
     }
     let before = text.get(..at?)?;
     Some(1 + before.matches('\n').count())
+}
+
+/// What an error about a part of a text is about: where that is the heading of a table, all of the table.
+pub(super) fn named(text: &str, span: Range<usize>) -> &str {
+    let (before, from) = text.split_at_checked(span.start).unwrap_or_default();
+    let is_line = before.is_empty() || before.ends_with('\n');
+    let end = match from.find("\n[") {
+        Some(next) if is_line && from.starts_with('[') => next,
+        None if is_line && from.starts_with('[') => from.len(),
+        _ => span.len(),
+    };
+    from.get(..end).unwrap_or_default()
 }
 
 /// Where in a scene file the key of an error is, as `scene.toml: line 6`; `None` if the error is about no key or the file

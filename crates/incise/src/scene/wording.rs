@@ -10,7 +10,7 @@ use crate::names::similar;
 
 /// A message of the TOML reader about a wrong type or value, a missing key, or an unknown name, in the words of scene files;
 /// other messages stay. An unknown name comes with the known one that is most similar, with the tables that have such a key,
-/// or with all known ones. `named` is the text that the message is about.
+/// or with all known ones, and a missing key with the others that are missing. `named` is the text that the message is about.
 pub(super) fn in_scene_words(message: &str, named: &str) -> String {
     let message = message.trim_end().replace('\n', " ");
     if message == "duplicate key" {
@@ -38,7 +38,7 @@ pub(super) fn in_scene_words(message: &str, named: &str) -> String {
             .to_owned();
     }
     if let Some(field) = message.strip_prefix("missing field ") {
-        return format!("the key {} is missing", field.replace('`', "'"));
+        return missing_keys(field.trim_matches('`'), named);
     }
     for beginning in ["invalid type: ", "invalid value: ", "invalid length "] {
         let parts = message.strip_prefix(beginning);
@@ -55,6 +55,58 @@ pub(super) fn in_scene_words(message: &str, named: &str) -> String {
         }
     }
     message
+}
+
+/// Names a missing key, and with it all others that its table lacks. `named` is the text of the table, or of one that it is in.
+fn missing_keys(key: &str, named: &str) -> String {
+    let schema = schema();
+    let tables = schema["definitions"].as_object().into_iter().flatten();
+    let kinds = tables.flat_map(|(_, table)| {
+        let kinds = table["oneOf"].as_array().into_iter().flatten();
+        std::iter::once(table).chain(kinds)
+    });
+    let outer = table_of(named);
+    let inner = outer.iter().flatten();
+    let given: Vec<&toml::Table> = outer
+        .iter()
+        .chain(inner.filter_map(|(_, value)| value.as_table()))
+        .collect();
+    let lacks = kinds.flat_map(|kind| given.iter().filter_map(|given| lacking(kind, given)));
+    let mut lacks: Vec<Vec<&str>> = lacks.filter(|keys| keys.contains(&key)).collect();
+    lacks.sort_unstable();
+    lacks.dedup();
+    match lacks.as_slice() {
+        // Its keys show which table it is.
+        [keys] if keys.len() > 1 => format!("the keys '{}' are missing", keys.join("', '")),
+        _ => format!("the key '{key}' is missing"),
+    }
+}
+
+/// The keys required of a table that are not among those given; `None` if it has no such keys.
+fn lacking<'a>(kind: &'a Value, given: &toml::Table) -> Option<Vec<&'a str>> {
+    let keys = kind["properties"].as_object()?;
+    let fits = |(key, value): (&String, &toml::Value)| {
+        let is_kind =
+            |kind: &Value| kind["const"].is_null() || kind["const"].as_str() == value.as_str();
+        keys.get(key).is_some_and(is_kind)
+    };
+    let required = kind["required"]
+        .as_array()?
+        .iter()
+        .filter_map(Value::as_str);
+    let lacking = required.filter(|key| !given.contains_key(*key)).collect();
+    given.iter().all(fits).then_some(lacking)
+}
+
+/// The table that a text writes, in one line or under its heading.
+fn table_of(text: &str) -> Option<toml::Table> {
+    let inline = toml::from_str::<toml::Table>(&format!("table = {text}"));
+    let table = inline.or_else(|_| toml::from_str(text)).ok()?;
+    match table.into_iter().next()?.1 {
+        toml::Value::Table(table) => Some(table),
+        toml::Value::Array(tables) => tables.into_iter().next()?.try_into().ok(),
+        _ => None,
+    }
 }
 
 fn unknown_name(unknown: &str, known: &[&str], named: &str) -> String {
@@ -365,6 +417,45 @@ mod tests {
             given.ends_with("the key 'angle_degrees' is missing"),
             "{given}"
         );
+    }
+
+    /// All that a table lacks is said at once.
+    #[test]
+    fn missing_keys_are_named_together() {
+        for (table, keys) in [
+            (
+                "[[stroke]]\nkind = \"plane\"\nframe = 3",
+                "the keys 'point', 'normal' are missing",
+            ),
+            (
+                "[[stroke]]\nkind = \"sweep\"",
+                "the keys 'frames', 'blade', 'path' are missing",
+            ),
+            (
+                "[[stroke]]\nkind = \"sweep\"\nframes = [1, 2]\nblade = [[0, 0, 0], [0, 0, 1]]\npath = [[0, 0, 0], [1, 0, 0]]\n\
+                 solid = { toughness = 3 }",
+                "the keys 'thickness', 'wedge_angle_degrees', 'height' are missing",
+            ),
+            (
+                "[[collider]]\nkind = \"box\"\nfriction = 1",
+                "the keys 'center', 'half_extents' are missing",
+            ),
+            (
+                "[[body]]\nshape = {}",
+                "the key 'kind' is missing",
+            ),
+            (
+                "[[body]]\nshape = { kind = \"liver\" }",
+                "the key 'tets' is missing",
+            ),
+            (
+                "[world]\nground = { friction = 0.5 }",
+                "the key 'height' is missing",
+            ),
+        ] {
+            let said = message(table);
+            assert!(said.ends_with(keys), "{table}: {said}");
+        }
     }
 
     #[test]
