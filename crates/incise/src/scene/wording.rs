@@ -440,10 +440,7 @@ mod tests {
                 "[[collider]]\nkind = \"box\"\nfriction = 1",
                 "the keys 'center', 'half_extents' are missing",
             ),
-            (
-                "[[body]]\nshape = {}",
-                "the key 'kind' is missing",
-            ),
+            ("[[body]]\nshape = {}", "the key 'kind' is missing"),
             (
                 "[[body]]\nshape = { kind = \"liver\" }",
                 "the key 'tets' is missing",
