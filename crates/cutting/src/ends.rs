@@ -314,12 +314,12 @@ impl Strokes {
 struct Surroundings<'a> {
     cuttable: &'a CuttableMesh,
     registry: &'a StrokeRegistry,
-    /// For each particle, once asked for, its place, or [`NONE`] if no stroke passes it.
+    /// For each particle its place, once asked for.
     numbers: Vec<Option<u32>>,
     places: Vec<Place>,
     /// The strokes through the places, with their tangent planes there.
     tangents: Vec<(u32, Tangent)>,
-    /// For each particle asked for, where in `near` the places in the tets around it are.
+    /// For each particle asked for, where in `near` the places that strokes pass in the tets around it are.
     around: HashMap<ParticleId, [u32; 2], FixedState>,
     near: Vec<u32>,
     /// Faces asked for.
@@ -329,13 +329,10 @@ struct Surroundings<'a> {
     marks: Vec<(u32, u32)>,
 }
 
-/// No place.
-const NONE: u32 = u32::MAX;
-
-/// A particle that strokes pass.
+/// A particle asked for.
 struct Place {
     rest: DVec3,
-    /// Start and end of its tangents.
+    /// Start and end of its tangents; the same if no stroke passes it.
     tangents: [u32; 2],
     /// The last face near which it was.
     face: u32,
@@ -366,24 +363,20 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// The place of a particle, or [`NONE`].
+    /// The place of a particle.
     fn number(&mut self, particle: ParticleId) -> u32 {
         if let Some(known) = self.numbers[particle.index()] {
             return known;
         }
+        let number = index(self.places.len());
         let start = self.tangents.len();
         self.tangents
             .extend(self.registry.surfaces_through(particle));
-        let tangents = [start, self.tangents.len()].map(index);
-        let mut number = NONE;
-        if tangents[0] < tangents[1] {
-            number = index(self.places.len());
-            self.places.push(Place {
-                rest: self.cuttable.mesh.positions[particle.index()],
-                tangents,
-                face: 0,
-            });
-        }
+        self.places.push(Place {
+            rest: self.cuttable.mesh.positions[particle.index()],
+            tangents: [start, self.tangents.len()].map(index),
+            face: 0,
+        });
         self.numbers[particle.index()] = Some(number);
         number
     }
@@ -410,12 +403,10 @@ impl<'a> Surroundings<'a> {
         let corners = tets.flat_map(|tet| self.cuttable.mesh.tets[tet.index()]);
         let mut all = Strokes::None;
         for p in corners {
-            let number = self.number(p);
-            if let Some(place) = self.places.get(number as usize) {
-                let [start, end] = place.tangents.map(|at| at as usize);
-                for (stroke, _) in &self.tangents[start..end] {
-                    all = all.and(Strokes::One(*stroke));
-                }
+            let number = self.number(p) as usize;
+            let [start, end] = self.places[number].tangents.map(|at| at as usize);
+            for (stroke, _) in &self.tangents[start..end] {
+                all = all.and(Strokes::One(*stroke));
             }
             if all == Strokes::Several {
                 break;
@@ -502,7 +493,7 @@ impl<'a> Surroundings<'a> {
         }
     }
 
-    /// Where in `near` the places in the tets around a particle are.
+    /// Where in `near` the places that strokes pass in the tets around a particle are.
     fn places_around(&mut self, particle: ParticleId) -> [u32; 2] {
         if let Some(known) = self.around.get(&particle) {
             return *known;
@@ -511,7 +502,8 @@ impl<'a> Surroundings<'a> {
         let tets = self.cuttable.around(particle);
         for p in tets.flat_map(|tet| self.cuttable.mesh.tets[tet.index()]) {
             let number = self.number(p);
-            if number != NONE && !self.near[start..].contains(&number) {
+            let [first, last] = self.places[number as usize].tangents;
+            if first < last && !self.near[start..].contains(&number) {
                 self.near.push(number);
             }
         }
