@@ -2,9 +2,9 @@
 //!
 //! A search starts at each particle where the piece may have separated. All advance in lockstep, one particle a round,
 //! from a particle to the particles of the tets around it. Searches that meet become one. A search with nothing left to
-//! find has found a complete part; once a single search is left the others are all parts that came off, and what that
-//! one would still find is the rest. So a slit costs the way around its front, and a part that comes off a few times
-//! its own size, however large the rest is.
+//! find has found a complete part; once a single search is left the others are all parts, and what that one would still
+//! find is the rest. Mostly the rest is the largest part, else that search goes on to the end. So a slit costs the way
+//! around its front, and a part that comes off a few times its own size, however large the rest is.
 //!
 //! Walking from star to star costs some ten times as much for a tet as a pass over all tets in order. So once the
 //! searches have looked at tets a quarter as often as the body has tets, they are given up and the pieces are counted
@@ -66,12 +66,11 @@ struct Search {
 }
 
 impl Parts {
-    /// Finds what came off the piece that all of `seeds` were on. Each part of it holds a seed; seeds are different and
-    /// none is without tets. Afterwards [`Parts::iter`] lists the parts.
+    /// Finds what came off the piece of `tets` tets that all of `seeds` were on. Each part of it holds a seed; seeds are
+    /// different and none is without tets. Afterwards [`Parts::iter`] lists the parts.
     ///
-    /// What is left is not among them: it is the part whose search was still running when all others had ended, or, if
-    /// none was or the searches were given up, the one with the most tets, then the one with the lowest tet.
-    pub(crate) fn find(&mut self, cuttable: &CuttableMesh, seeds: &[ParticleId]) {
+    /// What is left is not among them: the part with the most tets, of equal ones the one with the lowest tet.
+    pub(crate) fn find(&mut self, cuttable: &CuttableMesh, seeds: &[ParticleId], tets: usize) {
         self.tets.clear();
         self.ends.clear();
         self.search_of.resize(cuttable.mesh().positions.len(), NONE);
@@ -99,9 +98,16 @@ impl Parts {
             for &search in &ended {
                 self.gather(cuttable, search);
             }
-        }
-        if going.is_empty() {
-            self.keep_largest();
+            let rest = tets - self.tets.len();
+            if self.iter().any(|part| part.len() >= rest) {
+                for &search in &going {
+                    while self.searches[search as usize].open.first != NONE {
+                        self.advance(cuttable, search);
+                    }
+                    self.gather(cuttable, search);
+                }
+                self.keep_largest();
+            }
         }
         for found in self.found.drain(..) {
             self.search_of[found.particle.index()] = NONE;

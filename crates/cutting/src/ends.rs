@@ -38,6 +38,9 @@ const CLOSE: f64 = 0.75;
 /// Mean edges within which particles count alike for the plane of a stroke.
 const CORE: f64 = 0.1;
 
+/// Differences of distances that may come from rounding, in [`NEAR`].
+const ROUNDING: f64 = 1e-6;
+
 /// Parts of a smaller volume do not come off, in mean volumes.
 const SMALLEST: f64 = 4.0;
 
@@ -533,15 +536,14 @@ fn centroid(mesh: &TetMesh, tet: TetId) -> DVec3 {
     corners.map(|p| mesh.positions[p.index()]).sum::<DVec3>() / 4.0
 }
 
-/// On which sides of a plane particles are, by their distances from it: on one at least, and on both if they reach
-/// further than `near` on both. Of the positive side first.
+/// On which sides of a plane particles are, by their distances from it: on one unless all lie in it, and on both if they
+/// reach as far, or further than `near`, on both. Of the positive side first. Rounding decides nothing.
 fn sides(distances: &[f64], near: f64) -> [bool; 2] {
     let least = distances.iter().copied().fold(0.0, f64::min);
     let most = distances.iter().copied().fold(0.0, f64::max);
-    [
-        most > near || most >= -least,
-        -least > near || -least >= most,
-    ]
+    let further = f64::max(most, -least);
+    let alike = ROUNDING * near;
+    [most, -least].map(|reach| reach > near || (reach > alike && reach >= further - alike))
 }
 
 /// The number of a quarter, by whether it is on the negative sides of the first and of the second plane: neighbors

@@ -179,9 +179,8 @@ impl PieceTracker {
 
     /// Applies a delta and returns the detached and vanished pieces.
     ///
-    /// A detached part gets the next number. The part that keeps the old number is the one whose search was still
-    /// running when all other searches had ended, mostly the largest. If the last ones ended in the same round, or the
-    /// searches were given up for a count, it is the part with the most tets, then the one with the lowest tet.
+    /// A detached part gets the next number. The part with the most tets keeps the old number, of equal ones the one with
+    /// the lowest tet.
     ///
     /// # Returns
     /// Events, ascending by the piece that the part was detached from, then by the lowest tet of the part.
@@ -218,7 +217,8 @@ impl PieceTracker {
                 continue;
             }
             let seeds: Vec<ParticleId> = of_piece.iter().filter_map(|&(_, seed)| seed).collect();
-            self.parts.find(cuttable, &seeds);
+            self.parts
+                .find(cuttable, &seeds, self.pieces[piece as usize].tets);
             self.detach(cuttable, piece, &mut events);
         }
         events

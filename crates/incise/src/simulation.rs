@@ -656,7 +656,7 @@ impl Simulation {
     ///
     /// Before all cuts pieces are numbered body by body (joined bodies at the place of the first of them), those of a
     /// body by their first tets. Detached pieces get the next numbers, stroke by stroke and within a stroke body by
-    /// body. Mostly the larger part of a split piece keeps its number, see
+    /// body. The part of a split piece with the most tets keeps its number, see
     /// [`PieceTracker::apply_delta`](incise_cutting::PieceTracker::apply_delta). No number is used twice. O(pieces,
     /// including former ones).
     #[must_use]

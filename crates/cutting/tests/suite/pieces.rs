@@ -5,7 +5,7 @@ use incise_cutting::{
     CutDelta, CutOptions, CuttableMesh, MovedTet, PieceEvent, PieceTracker, Plane, RemovedTet,
     Sweep, cut_plane,
 };
-use incise_mesh::{TetId, TetMesh, kuhn_box};
+use incise_mesh::{ParticleId, TetId, TetMesh, kuhn_box};
 use incise_meshing::{Shape, generate};
 use proptest::prelude::*;
 
@@ -57,7 +57,19 @@ impl Tracked {
                     let now = self.pieces.piece(piece).unwrap();
                     assert_eq!((now.parent, now.tets), (Some(from), tets));
                     assert_eq!(now.volume, volume);
-                    assert!(known.contains(&from) && self.pieces.piece(from).is_some());
+                    assert!(known.contains(&from));
+                    let rest = self.pieces.piece(from).unwrap();
+                    assert!(
+                        rest.tets >= tets,
+                        "{rest:?} keeps the number, {now:?} came off"
+                    );
+                    if rest.tets == tets {
+                        let mut labels = (0..).map(|t| self.pieces.piece_of(TetId::new(t)));
+                        assert_eq!(
+                            labels.find(|label| [piece, from].contains(label)),
+                            Some(from)
+                        );
+                    }
                     expected.push(piece);
                 }
                 PieceEvent::Vanished { piece } => {
@@ -231,6 +243,29 @@ fn who_keeps_the_number() {
     // The same again is nothing, and costs nothing.
     assert!(tracked.plane(DVec3::X * 6.0, DVec3::X, 0.0).is_empty());
     assert_eq!(tracked.pieces.visited_tets(), 0);
+}
+
+/// A cube on a bar that has fewer tets but more particles, so that its search ends last. A large piece beside them lets
+/// the searches come to their ends.
+#[test]
+fn a_bar_with_more_particles_comes_off() {
+    let mut mesh = kuhn_box([9, 2, 2], DVec3::new(9.0, 2.0, 2.0));
+    let first = mesh.positions.len() as u32;
+    let beside = kuhn_box([10; 3], DVec3::splat(10.0));
+    let moved = beside.positions.iter().map(|x| x + DVec3::splat(20.0));
+    mesh.positions.extend(moved);
+    let corners = beside.tets.iter();
+    mesh.tets
+        .extend(corners.map(|tet| tet.map(|p| ParticleId(p.0 + first))));
+    let mut tracked = Tracked::new(mesh);
+    tracked.delete(|t| t < 6 * 36 && t / 6 % 9 >= 2 && t / 6 >= 9);
+    let cube = tracked.pieces.piece(0).unwrap();
+    assert_eq!(cube.tets, 6 * (8 + 7));
+    let events = tracked.plane(DVec3::X * 2.0, DVec3::X, 0.0);
+    let [PieceEvent::Detached { from: 0, tets, .. }] = events[..] else {
+        panic!("{events:?}");
+    };
+    assert_eq!(tets, 6 * 7);
 }
 
 /// One cut takes parts off several pieces, and several parts off one.

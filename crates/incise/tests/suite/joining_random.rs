@@ -345,6 +345,68 @@ fn rounding_does_not_choose_sides_of_a_cut_beside_an_earlier_one() {
     joined_equal_tied(2, &[cuts, ties].concat());
 }
 
+/// The particles of one stroke near its meeting with another lie in the plane of the other, so that rounding decided on
+/// which side of it the stroke ends.
+#[test]
+fn rounding_does_not_choose_the_side_on_which_a_stroke_ends() {
+    let cuts = [
+        [
+            0.388_884_907_133_127_57,
+            0.114_453_014_012_486,
+            -0.212_108_082_678_001_85,
+        ],
+        [-0.455_940_954_653_700_7, 0.397_137_970_764_463_44, 0.0],
+        [-0.615_607_694_988_086_5, 0.0, 0.0],
+        [0.0, 0.626_125_838_015_265_7, 0.708_871_808_958_560_6],
+    ];
+    let [a, b, c, d] = cuts.map(|normal| Act::Cut(0, normal));
+    let tie = Act::Tie(0, 1, 0.99, 0.0);
+    joined_equal_tied(4, &[a, b, c, tie.clone(), tie, d]);
+}
+
+/// Which part of a split piece keeps its number does not depend on what else is solved with it.
+#[test]
+fn bodies_beside_a_piece_do_not_choose_its_number() {
+    let cuts = [
+        (
+            0,
+            [
+                -0.962_108_444_607_719,
+                -0.587_310_092_899_085_3,
+                -0.380_652_219_017_513_2,
+            ],
+        ),
+        (0, [0.0, 0.641_967_443_557_670_9, 0.0]),
+        (
+            0,
+            [
+                0.462_589_418_427_962_47,
+                -0.117_836_786_306_852_82,
+                -0.266_798_338_455_811_2,
+            ],
+        ),
+        (1, [-0.347_749_953_479_221_05, 0.0, 0.0]),
+        (
+            1,
+            [
+                0.922_502_884_967_860_1,
+                -0.733_531_707_395_178_6,
+                0.420_859_545_604_920_17,
+            ],
+        ),
+        (
+            0,
+            [
+                0.143_038_507_217_570_78,
+                0.274_564_905_960_997_5,
+                -0.492_341_779_377_843_35,
+            ],
+        ),
+    ];
+    let [a, b, c, d, e, f] = cuts.map(|(body, normal)| Act::Cut(body, normal));
+    joined_equal_tied(2, &[a, Act::Step, b, Act::Step, c, d, e, f]);
+}
+
 /// Plays acts without hands; the center of mass moves on as at the start, with the same momentum. Where a cut lends mass from
 /// particle to particle, the center is another one, but not the momentum.
 fn keeps_momentum(bodies: usize, acts: &[Act], builder: SimulationBuilder, tolerance: f64) {
