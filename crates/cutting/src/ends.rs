@@ -537,7 +537,7 @@ fn centroid(mesh: &TetMesh, tet: TetId) -> DVec3 {
 }
 
 /// On which sides of a plane particles are, by their distances from it: on one unless all lie in it, and on both if they
-/// reach as far, or further than `near`, on both. Of the positive side first. Rounding decides nothing.
+/// reach as far, or further than `near`, on both. Of the positive side first. Rounding does not choose one of two.
 fn sides(distances: &[f64], near: f64) -> [bool; 2] {
     let least = distances.iter().copied().fold(0.0, f64::min);
     let most = distances.iter().copied().fold(0.0, f64::max);
