@@ -15,6 +15,17 @@ fn vector(seed: u64, first: usize) -> DVec3 {
     DVec3::from_array([0, 1, 2].map(|k| noise(seed, first + k)))
 }
 
+/// A mesh and another one, moved by `way`.
+fn side_by_side(mut mesh: TetMesh, other: &TetMesh, way: DVec3) -> TetMesh {
+    let first = mesh.positions.len();
+    mesh.positions
+        .extend(other.positions.iter().map(|x| *x + way));
+    let shifted = |p: ParticleId| ParticleId::new(first + p.index());
+    mesh.tets
+        .extend(other.tets.iter().map(|tet| tet.map(shifted)));
+    mesh
+}
+
 /// A body, its pieces, and its volume before all cuts.
 struct Tracked {
     body: CuttableMesh,
@@ -249,15 +260,9 @@ fn who_keeps_the_number() {
 /// the searches come to their ends.
 #[test]
 fn a_bar_with_more_particles_comes_off() {
-    let mut mesh = kuhn_box([9, 2, 2], DVec3::new(9.0, 2.0, 2.0));
-    let first = mesh.positions.len() as u32;
+    let mesh = kuhn_box([9, 2, 2], DVec3::new(9.0, 2.0, 2.0));
     let beside = kuhn_box([10; 3], DVec3::splat(10.0));
-    let moved = beside.positions.iter().map(|x| x + DVec3::splat(20.0));
-    mesh.positions.extend(moved);
-    let corners = beside.tets.iter();
-    mesh.tets
-        .extend(corners.map(|tet| tet.map(|p| ParticleId(p.0 + first))));
-    let mut tracked = Tracked::new(mesh);
+    let mut tracked = Tracked::new(side_by_side(mesh, &beside, DVec3::splat(20.0)));
     tracked.delete(|t| t < 6 * 36 && t / 6 % 9 >= 2 && t / 6 >= 9);
     let cube = tracked.pieces.piece(0).unwrap();
     assert_eq!(cube.tets, 6 * (8 + 7));
@@ -358,16 +363,9 @@ fn parts_that_come_off_together() {
 /// A mesh of several bodies starts with as many pieces.
 #[test]
 fn pieces_before_all_cuts() {
-    let mut mesh = kuhn_box([1; 3], DVec3::ONE);
+    let mesh = kuhn_box([1; 3], DVec3::ONE);
     let other = kuhn_box([2, 1, 1], DVec3::ONE);
-    let first = mesh.positions.len();
-    mesh.positions
-        .extend(other.positions.iter().map(|x| *x + DVec3::Y * 3.0));
-    let shifted = |tet: &[incise_mesh::ParticleId; 4]| {
-        tet.map(|p| incise_mesh::ParticleId::new(first + p.index()))
-    };
-    mesh.tets.extend(other.tets.iter().map(shifted));
-    let tracked = Tracked::new(mesh);
+    let tracked = Tracked::new(side_by_side(mesh, &other, DVec3::Y * 3.0));
     let pieces: Vec<_> = tracked
         .pieces
         .iter()
